@@ -133,7 +133,10 @@ class Copy {
 
     Expected<> copy_chunk(const McapChunk& chunk) {
         const auto records = from_.load(chunk, buffer_);
-        if (!records) return Unexpected(records.error());
+        if (!records) {
+            settings_.damaged(records.error());
+            return {};
+        }
         records_.clear();
         places_.clear();
         SummaryChunk one{};

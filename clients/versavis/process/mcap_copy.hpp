@@ -28,6 +28,8 @@ struct McapCopySettings {
     /// Gets all messages of a chunk before any of them is changed.
     std::function<void(const McapChannel&, const McapMessage&)> look;
     std::function<std::optional<ChangedMessage>(const McapChannel&, const McapMessage&)> change;
+    /// A chunk that is left out.
+    std::function<void(const Error&)> damaged;
     McapAttachment added;                     ///< besides those that are there
     std::function<bool(double share)> go_on;  ///< how far it is; false: stop
 };

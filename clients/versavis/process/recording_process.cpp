@@ -659,6 +659,10 @@ Expected<ProcessReport> process_recording(const std::string& path, const std::st
     settings.change = [&](const McapChannel& channel, const McapMessage& message) {
         return processing.change(channel, message);
     };
+    recording->check();
+    for (const std::string& damage : recording->damages())
+        report.notes.push_back("left out: " + damage);
+    settings.damaged = [](const Error&) {};  // check() found the same
     settings.added = {"process.json", "application/json", to_json(report).dump(2) + "\n"};
     settings.go_on = go_on;
     if (const auto copied = copy_mcap(*reader, output, settings); !copied)

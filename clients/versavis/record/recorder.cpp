@@ -229,10 +229,11 @@ void Recorder::go_back() {
         if (item) newest = newest ? std::max(*newest, item->time) : item->time;
     }
     if (!newest) return;
+    report_.from = *newest - *settings_.before;
     for (const auto& source : sources_) {
         if (!has_stamps(source->kind())) continue;
         source->reader.seek(ring::Position::oldest);
-        source->from = *newest - *settings_.before;
+        source->from = report_.from;
     }
 }
 

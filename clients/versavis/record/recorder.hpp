@@ -32,6 +32,7 @@ struct RecordReport {
     std::map<std::string, StreamReport> streams;
     std::uint64_t slips = 0;             ///< of the pairing, by events
     std::vector<std::string> left_out;   ///< streams that could not be read, and why
+    std::optional<OutputTime> from;      ///< where `before` wanted it to begin
     std::optional<Error> stopped_early;  ///< the disk's; what was written before is good
 
     std::uint64_t items() const;

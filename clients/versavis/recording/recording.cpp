@@ -63,6 +63,24 @@ std::string metadata_value(const RecordingFacts& facts, const std::string& key) 
     return found == facts.metadata.end() ? std::string() : found->second;
 }
 
+/// The numbers of files that are named as later ones of a recording.
+std::set<std::uint32_t> later_parts(const std::filesystem::path& first) {
+    std::set<std::uint32_t> parts;
+    const std::string begin = first.stem().string() + "-";
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(
+             first.parent_path().empty() ? "." : first.parent_path(), error)) {
+        const std::string stem = entry.path().stem().string();
+        if (entry.path().extension() != first.extension() || !stem.starts_with(begin)) continue;
+        const std::string number = stem.substr(begin.size());
+        const bool digits = number.find_first_not_of("0123456789") == std::string::npos;
+        if (number.size() < 4 || number.size() > 6 || !digits) continue;
+        parts.insert(static_cast<std::uint32_t>(std::stoul(number)));
+    }
+    parts.erase(0);
+    return parts;
+}
+
 }  // namespace
 
 struct Recording::File {
@@ -77,24 +95,31 @@ struct Recording::File {
     std::vector<RecordedStream> streams;
     std::vector<Attachment> attachments;
     RecordingFacts facts;
-    std::list<Kept> kept;     ///< the one used last in front
-    Walk places;              ///< of at()
-    std::uint32_t index = 0;  ///< among the recording's files
+    std::list<Kept> kept;                                  ///< the one used last in front
+    Walk places;                                           ///< of at()
+    std::uint32_t index = 0;                               ///< among the recording's files
+    mutable std::map<std::uint64_t, std::string> damages;  ///< by their places
+    mutable std::set<std::uint32_t> damaged_chunks;
 
     explicit File(McapReader opened) : reader(std::move(opened)) {}
 
     Expected<> take_stock();
-    Expected<> count_items();
+    void count_items();
     void count(const ChannelRole& part, std::uint64_t items);
     Walk walk(const std::vector<std::string>& wanted) const;
     Expected<bool> visit(Walk& walk, std::uint32_t chunk, const McapRecord& record,
                          const Take& take, bool with_pixels) const;
     Expected<bool> take_item(Walk& walk, const ChannelRole& part, std::uint32_t chunk,
                              const McapRecord& record, const Take& take, bool with_pixels) const;
-    Expected<bool> for_each(const std::vector<std::string>& wanted, const Take& take,
-                            bool with_pixels) const;
+    bool for_each(const std::vector<std::string>& wanted, const Take& take, bool with_pixels) const;
+    void each_record(std::uint32_t chunk, bool with_pixels, const McapReader::Visit& visit) const;
+    void note(std::uint64_t offset, const Error& damage) const;
+    void check() const;
     Expected<std::span<const std::byte>> keep(std::uint32_t chunk);
-    Expected<> add_gaps(std::vector<RecordedGap>& gaps) const;
+    void add_gaps(std::vector<RecordedGap>& gaps) const;
+
+ private:
+    mutable McapBuffer buffer_;
 };
 
 Recording::Recording() = default;
@@ -121,12 +146,14 @@ Expected<Recording> Recording::open_file(const std::string& path) {
 /// NAME.mcap is followed by NAME-0001.mcap and so on, of the same run of the same instance.
 void Recording::follow(const std::string& path) {
     const std::filesystem::path first(path);
-    for (std::uint32_t part = 1;; ++part) {
+    const auto named = [&](std::uint32_t part) {
         auto next = first;
-        next.replace_filename(
+        return next.replace_filename(
             fmt::format("{}-{:04}{}", first.stem().string(), part, first.extension().string()));
-        std::error_code error;
-        if (!std::filesystem::exists(next, error)) return;
+    };
+    std::uint32_t last = 0;
+    for (const std::uint32_t part : later_parts(first)) {
+        const auto next = named(part);
         auto opened = open_file(next.string());
         const bool belongs =
             opened && metadata_value(opened->facts_, "part") == std::to_string(part) &&
@@ -137,8 +164,12 @@ void Recording::follow(const std::string& path) {
             const std::string why = opened ? "it is of another recording" : opened.error().what;
             facts_.defect += fmt::format("{}{} is not used: {}", facts_.defect.empty() ? "" : "; ",
                                          next.filename().string(), why);
-            return;
+            continue;
         }
+        for (std::uint32_t missing = last + 1; missing < part; ++missing)
+            if (std::error_code error; !std::filesystem::exists(named(missing), error))
+                facts_.missing.push_back(named(missing).filename().string());
+        last = part;
         add(std::move(opened->files_.front()));
     }
 }
@@ -192,6 +223,7 @@ void Recording::File::count(const ChannelRole& part, std::uint64_t items) {
 }
 
 Expected<> Recording::File::take_stock() {
+    for (const McapDamage& one : reader.damages()) damages[one.offset] = one.what;
     for (const auto& one : reader.attachments())
         attachments.push_back({one.name, one.media_type, one.content});
     facts = {1,
@@ -214,13 +246,15 @@ Expected<> Recording::File::take_stock() {
             const auto found = reader.statistics()->of_channel.find(channel);
             count(part, found == reader.statistics()->of_channel.end() ? 0 : found->second);
         }
-    } else if (auto counted = count_items(); !counted) {
-        return counted;
+    } else {
+        count_items();
     }
     places = walk({});
     if (streams.empty() && !ours)
         return failure(reader.path(),
-                       reader.chunks().empty() && !reader.defect().empty()
+                       !damages.empty()
+                           ? "holds no item that can be read: " + damages.begin()->second
+                       : reader.chunks().empty() && !reader.defect().empty()
                            ? "holds no complete chunk: " + reader.defect()
                            : "is not a VersaVIS recording: it has none of its items",
                        "name a file that 'versavis record' wrote");
@@ -228,20 +262,17 @@ Expected<> Recording::File::take_stock() {
 }
 
 /// Of a file that was cut off: channels are announced on the way.
-Expected<> Recording::File::count_items() {
+void Recording::File::count_items() {
     Walk all = walk({});
     const Take take = [&](const RecordedItem& item) {
         count({Role::item, item.stream, item.kind}, 1);
         return true;
     };
-    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk) {
-        auto glanced = reader.glance(reader.chunks()[chunk], [&](const McapRecord& record) {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, false, [&](const McapRecord& record) {
             return visit(all, chunk, record, take, false);
         });
-        if (!glanced) return glanced;
-    }
     parts = std::move(all.parts);
-    return {};
 }
 
 Walk Recording::File::walk(const std::vector<std::string>& wanted) const {
@@ -329,28 +360,48 @@ Expected<bool> Recording::File::take_item(Walk& walk, const ChannelRole& part, s
     return take(item);
 }
 
-Expected<bool> Recording::File::for_each(const std::vector<std::string>& wanted, const Take& take,
-                                         bool with_pixels) const {
+void Recording::File::note(std::uint64_t offset, const Error& damage) const {
+    damages.try_emplace(offset, damage.what);
+}
+
+/// A chunk that is damaged is left out, and so is a record that `visit` cannot use.
+void Recording::File::each_record(std::uint32_t chunk, bool with_pixels,
+                                  const McapReader::Visit& visit) const {
+    const McapChunk& place = reader.chunks()[chunk];
+    if (damaged_chunks.count(chunk) != 0) return;
+    const McapReader::Visit each = [&](const McapRecord& record) -> Expected<bool> {
+        auto taken = visit(record);
+        if (taken) return taken;
+        note(record.offset, taken.error());
+        return true;
+    };
+    Expected<> read;
+    if (!with_pixels) {
+        read = reader.glance(place, each);
+    } else {
+        const auto records = reader.load(place, buffer_);
+        if (!records) damaged_chunks.insert(chunk);
+        read = records ? reader.for_each(place, *records, each) : Unexpected(records.error());
+    }
+    if (!read) note(place.offset, read.error());
+}
+
+void Recording::File::check() const {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, true, [](const McapRecord&) -> Expected<bool> { return true; });
+}
+
+bool Recording::File::for_each(const std::vector<std::string>& wanted, const Take& take,
+                               bool with_pixels) const {
     Walk way = walk(wanted);
-    McapBuffer buffer;
     bool more = true;
-    const auto& chunks = reader.chunks();
-    for (std::uint32_t chunk = 0; more && chunk < chunks.size(); ++chunk) {
+    for (std::uint32_t chunk = 0; more && chunk < reader.chunks().size(); ++chunk) {
         way.images.clear();
-        const McapReader::Visit each = [&](const McapRecord& record) -> Expected<bool> {
+        each_record(chunk, with_pixels, [&](const McapRecord& record) -> Expected<bool> {
             auto taken = visit(way, chunk, record, take, with_pixels);
-            more = taken && *taken;
+            if (taken) more = *taken;
             return taken;
-        };
-        if (!with_pixels) {
-            if (auto read = reader.glance(chunks[chunk], each); !read)
-                return Unexpected(read.error());
-            continue;
-        }
-        const auto records = reader.load(chunks[chunk], buffer);
-        if (!records) return Unexpected(records.error());
-        if (auto read = reader.for_each(chunks[chunk], *records, each); !read)
-            return Unexpected(read.error());
+        });
     }
     return more;
 }
@@ -365,11 +416,8 @@ Expected<> Recording::glance(const std::vector<std::string>& streams, const Take
 
 Expected<> Recording::in_each_file(const std::vector<std::string>& streams, const Take& take,
                                    bool with_pixels) const {
-    for (const auto& file : files_) {
-        const auto more = file->for_each(streams, take, with_pixels);
-        if (!more) return Unexpected(more.error());
-        if (!*more) return {};
-    }
+    for (const auto& file : files_)
+        if (!file->for_each(streams, take, with_pixels)) break;
     return {};
 }
 
@@ -415,9 +463,9 @@ Expected<> Recording::at(const ItemPlace& place, const Take& take) const {
     return {};
 }
 
-Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
-    for (const McapChunk& chunk : reader.chunks()) {
-        auto read = reader.glance(chunk, [&](const McapRecord& record) -> Expected<bool> {
+void Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, false, [&](const McapRecord& record) -> Expected<bool> {
             const auto message =
                 record.opcode == McapOpcode::message ? parse_message(record.content) : std::nullopt;
             if (!message) return true;
@@ -432,16 +480,29 @@ Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
                             {static_cast<std::int64_t>(message->log_time)}});
             return true;
         });
-        if (!read) return read;
-    }
-    return {};
 }
 
 Expected<std::vector<RecordedGap>> Recording::gaps() const {
     std::vector<RecordedGap> gaps;
-    for (const auto& file : files_)
-        if (auto added = file->add_gaps(gaps); !added) return Unexpected(added.error());
+    for (const auto& file : files_) file->add_gaps(gaps);
     return gaps;
+}
+
+void Recording::check() const {
+    for (const auto& file : files_) file->check();
+}
+
+std::vector<std::string> Recording::damages() const {
+    std::vector<std::string> all;
+    for (const auto& file : files_)
+        for (const auto& [offset, what] : file->damages)
+            all.push_back(
+                files_.size() == 1
+                    ? what
+                    : fmt::format("{}: {}",
+                                  std::filesystem::path(file->reader.path()).filename().string(),
+                                  what));
+    return all;
 }
 
 }  // namespace versavis::client
