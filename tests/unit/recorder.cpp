@@ -325,6 +325,7 @@ TEST_CASE_METHOD(RecordedInstance, "recorder: the past, as far as the rings go")
     });
     CHECK(report.lost() == 0);
     CHECK(frames_in(settings.output).numbers == from_to(15, 22));
+    CHECK_THAT(to_text(report, false), !Catch::Contains("later than --before"));
 }
 
 TEST_CASE_METHOD(RecordedInstance,
@@ -340,6 +341,8 @@ TEST_CASE_METHOD(RecordedInstance,
     const auto numbers = frames_in(settings.output).numbers;
     REQUIRE(numbers.size() >= ring_slots / 2);
     CHECK(numbers == from_to(numbers.front(), 203));
+    CHECK_THAT(to_text(report, false),
+               Catch::Contains("cam0 begins") && Catch::Contains("later than --before asked for"));
 }
 
 TEST_CASE_METHOD(RecordedInstance,
