@@ -142,10 +142,9 @@ RecordingFile::RecordingFile(const std::string& part, const std::string& recordi
 std::uint16_t RecordingFile::channel(const std::string& topic, const std::string& encoding,
                                      const std::string& schema, const std::string& schema_encoding,
                                      const std::map<std::string, std::string>& metadata) {
-    const auto found = channels_.find(topic);
-    if (found != channels_.end()) return found->second;
-    const auto id = static_cast<std::uint16_t>(channels_.size() + 1);
-    channels_[topic] = id;
+    const auto id = channels_.try_emplace(topic, static_cast<std::uint16_t>(channels_.size() + 1))
+                        .first->second;
+    if (!announced_.insert(id).second) return id;
     summary_.schemas[id] = raw(id) + text(schema) + text(schema_encoding) + text("");
     summary_.channels[id] = raw(id) + raw(id) + text(topic) + text(encoding) + map_text(metadata);
     chunk_ += record(3, summary_.schemas[id]) + record(4, summary_.channels[id]);
@@ -183,8 +182,9 @@ void RecordingFile::add_gap(const std::string& stream, const std::string& reason
                         time.ns));
 }
 
-void RecordingFile::end_chunk() {
+void RecordingFile::end_chunk(bool anew) {
     if (chunk_.empty()) return;
+    if (anew) announced_.clear();
     std::uint64_t first = ~std::uint64_t{0};
     std::uint64_t last = 0;
     for (const auto& [id, places] : places_)

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,8 @@ class RecordingFile {
     void add(const FileItem& item, bool as_png = false);
     void add_gap(const std::string& stream, const std::string& reason, std::uint64_t items,
                  OutputTime time);
-    void end_chunk();
+    /// `anew`: the next chunk announces its channels again, as the recorder does.
+    void end_chunk(bool anew = false);
     void add_attachment(const std::string& name, const std::string& content);
 
     /// What is there so far, with the last chunk as far as it is ended.
@@ -57,6 +59,7 @@ class RecordingFile {
     std::string chunk_;
     client::McapSummary summary_;
     std::map<std::string, std::uint16_t> channels_;
+    std::set<std::uint16_t> announced_;
     std::map<std::uint16_t, std::vector<client::MessagePlace>> places_;
     std::uint32_t sequence_ = 0;
 };

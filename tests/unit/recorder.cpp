@@ -16,20 +16,23 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <thread>
 
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
+#include "base/byte_cursor.hpp"
 #include "commands/record_command.hpp"
 #include "engine/ring/writer.hpp"
 #include "mcap_messages.hpp"
 #include "pixel_formats.hpp"
 #include "record/item_writer.hpp"
+#include "recording/item_messages.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"
+#include "recording/ros_messages.hpp"
+#include "ros_decoder.hpp"
 #include "versavis/fields.hpp"
 #include "versavis/ring_path.hpp"
 
@@ -168,12 +171,12 @@ std::vector<std::uint64_t> from_to(std::uint64_t first, std::uint64_t end) {
     return numbers;
 }
 
-std::vector<nlohmann::json> json_messages(const std::string& path, const std::string& topic) {
+std::vector<nlohmann::json> decoded_messages(const std::string& path, const std::string& topic,
+                                             std::string_view type) {
     std::vector<nlohmann::json> found;
+    test::RosDecoder decoder(ros_definition(type));
     test::for_each_message(path, [&](const std::string& its_topic, const auto& message) {
-        const auto* const text = reinterpret_cast<const char*>(message.data.data());
-        if (its_topic == topic)
-            found.push_back(nlohmann::json::parse(text, text + message.data.size()));
+        if (its_topic == topic) found.push_back(decoder.decode(std::string(as_text(message.data))));
     });
     return found;
 }
@@ -221,12 +224,17 @@ TEST_CASE_METHOD(RecordedInstance, "recorder: stamps and events have time, life,
         events->publish(OutputTime{5}, pack(EventMetadata{}));
         return turn < 2;
     });
-    for (const auto& [topic, kind] : {std::pair{"/versavis/cam0/stamp", ring::StreamKind::frames},
-                                      std::pair{"/versavis/events", ring::StreamKind::events}}) {
-        std::set<std::string> expected{"time_ns", "life"};
-        for (const Field& field : fields_of(kind)) expected.insert(field.name);
-        const auto messages = json_messages(settings.output, topic);
-        INFO(topic);
+    struct Note {
+        const char* topic;
+        std::string_view type;
+        ring::StreamKind kind;
+    };
+    for (const Note& note : {Note{"/versavis/cam0/stamp", stamp_type, ring::StreamKind::frames},
+                             Note{"/versavis/events", event_type, ring::StreamKind::events}}) {
+        std::set<std::string> expected{"header", "time_ns", "life"};
+        for (const Field& field : fields_of(note.kind)) expected.insert(field.name);
+        const auto messages = decoded_messages(settings.output, note.topic, note.type);
+        INFO(note.topic);
         CHECK_FALSE(messages.empty());
         for (const auto& message : messages) {
             std::set<std::string> names;
@@ -317,6 +325,7 @@ TEST_CASE_METHOD(RecordedInstance, "recorder: the past, as far as the rings go")
     });
     CHECK(report.lost() == 0);
     CHECK(frames_in(settings.output).numbers == from_to(15, 22));
+    CHECK_THAT(to_text(report, false), !Catch::Contains("later than --before"));
 }
 
 TEST_CASE_METHOD(RecordedInstance,
@@ -332,6 +341,8 @@ TEST_CASE_METHOD(RecordedInstance,
     const auto numbers = frames_in(settings.output).numbers;
     REQUIRE(numbers.size() >= ring_slots / 2);
     CHECK(numbers == from_to(numbers.front(), 203));
+    CHECK_THAT(to_text(report, false),
+               Catch::Contains("cam0 begins") && Catch::Contains("later than --before asked for"));
 }
 
 TEST_CASE_METHOD(RecordedInstance,

@@ -13,8 +13,11 @@
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "mcap_messages.hpp"
+#include "recording/item_messages.hpp"
 #include "recording/recording.hpp"
+#include "recording/ros_messages.hpp"
 #include "recording_sketch.hpp"
+#include "ros_decoder.hpp"
 
 using namespace versavis;
 using namespace versavis::client;
@@ -202,6 +205,7 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
     }));
     REQUIRE(flags.size() == 600);
     std::map<std::string, int> seen;
+    test::RosDecoder stamps(ros_definition(stamp_type));
     test::for_each_message(new_file, [&](const std::string& topic, const auto& message) {
         const int index = seen[topic]++;
         const std::string data(reinterpret_cast<const char*>(message.data.data()),
@@ -214,11 +218,11 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
             CHECK(std::uint64_t(s) * 1'000'000'000 + ns == message.log_time);
             CHECK(data.substr(12) == std::string(28, '\1'));
         } else if (topic == "/versavis/cam0/stamp") {
-            const auto stamp = nlohmann::json::parse(data);
+            const auto stamp = stamps.decode(data);  // it was JSON, as before version 2
             CHECK(stamp["time_ns"] == message.log_time);
             CHECK(stamp["suspect"] == false);
             CHECK(stamp["flags"] == flags[index]);
-            if (index == 3) CHECK(stamp["trigger"] == 4);
+            if (index == 3) CHECK(stamp["trigger"][0] == 4);
         }
     });
     CHECK(seen["/cam0/image_raw"] == 600);

@@ -47,13 +47,15 @@ void FileCommands::add_info(CLI::App& app) {
         "info",
         "Show a recording's streams, rates, gaps and attachments, and whether it is complete");
     info_->add_option("file", file_, "Recording")->required();
+    info_->add_flag("--check", check_, "Read the whole file and check all checksums");
     info_->add_flag("--json", json_, "Print a JSON object");
 }
 
 void FileCommands::add_repair(CLI::App& app) {
     repair_ = app.add_subcommand("repair",
-                                 "Complete a truncated recording after its last complete chunk. "
-                                 "The removed rest is kept in FILE.cut");
+                                 "Complete a truncated or damaged recording with all that can "
+                                 "be read. What is cut off is kept in FILE.cut; a file with "
+                                 "other damage as FILE.damaged");
     repair_->add_option("file", file_, "Recording")->required();
     repair_->add_option("-o,--output", output_, "Write a new file, and leave this one unchanged");
     repair_->add_flag("--cut", cut_, "End the recording before the first damaged chunk");
@@ -138,6 +140,7 @@ int FileCommands::run(const std::string& instance) {
 int FileCommands::show_info() const {
     const auto recording = Recording::open(file_);
     if (!recording) return fail(recording.error());
+    if (check_) recording->check();
     const auto info = recording_info(file_, *recording);
     if (!info) return fail(info.error());
     using Json = nlohmann::json;
@@ -178,6 +181,10 @@ int FileCommands::play_file(const std::string& instance) {
     const auto report = play(*recording, play_settings_);
     line.end();
     if (!report) return fail(report.error());
+    for (const std::string& file : recording->facts().missing)
+        fmt::print(stderr, "versavis: {} is missing and was not played\n", file);
+    for (const std::string& damage : recording->damages())
+        fmt::print(stderr, "versavis: not played: {}\n", damage);
     fmt::print("{} items played in instance {}, the latest {:.1f} ms late\n", report->items,
                play_settings_.instance, static_cast<double>(report->latest.ns) / 1e6);
     if (report->without_pixels > 0)

@@ -48,6 +48,7 @@ class FileCommands {
     bool json_ = false;
     std::string file_;
     std::string output_;
+    bool check_ = false;
     bool cut_ = false;
     std::string recording_;
     std::string imu_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "commands/progress_line.hpp"
@@ -48,6 +49,20 @@ std::string progress_text(const RecordReport& report, std::uint64_t room) {
                  : "");
 }
 
+/// Cameras and IMUs of which --before got less than was asked for, and how many seconds less.
+std::map<std::string, double> late_begins(const RecordReport& report) {
+    constexpr double unsaid_s = 0.5;  // longer than from one frame to the next
+    std::map<std::string, double> late;
+    if (!report.from) return late;
+    for (const auto& [name, stream] : report.streams) {
+        const bool steady =
+            stream.kind == ring::StreamKind::frames || stream.kind == ring::StreamKind::imu;
+        const double seconds = in_seconds(stream.first - *report.from);
+        if (steady && stream.items > 0 && seconds > unsaid_s) late[name] = seconds;
+    }
+    return late;
+}
+
 nlohmann::ordered_json report_json(const RecordReport& report) {
     nlohmann::ordered_json streams = nlohmann::ordered_json::object();
     for (const auto& [name, stream] : report.streams)
@@ -62,7 +77,8 @@ nlohmann::ordered_json report_json(const RecordReport& report) {
                                     {"lost", report.lost()},
                                     {"pairing_slips", report.slips},
                                     {"streams", streams},
-                                    {"left_out", report.left_out}};
+                                    {"left_out", report.left_out},
+                                    {"begins_late_s", late_begins(report)}};
     document["stopped_early"] = report.stopped_early
                                     ? nlohmann::ordered_json(report.stopped_early->message())
                                     : nlohmann::ordered_json();
@@ -99,6 +115,11 @@ std::string to_text(const RecordReport& report, bool json) {
         text += "\n";
     }
     if (report.slips > 0) text += fmt::format("the pairing slipped {} times\n", report.slips);
+    for (const auto& [name, late] : late_begins(report))
+        text += fmt::format(
+            "{} begins {:.1f} s later than --before asked for: its ring held no "
+            "more (history_s)\n",
+            name, late);
     for (const std::string& why : report.left_out) text += "not recorded: " + why + "\n";
     if (report.stopped_early)
         text += fmt::format("stopped early: {}\n", report.stopped_early->message());
@@ -114,7 +135,8 @@ RecordCommand::RecordCommand(CLI::App& app, std::function<bool()> stop)
     settings_.stop = std::move(stop);
     command_->add_option("stream", settings_.streams, "Streams to record (default: all)");
     command_->add_option("-o,--output", settings_.output,
-                         "File to write (default: versavis-DATE-TIME.mcap)");
+                         "File to write (default: versavis-DATE-TIME.mcap); NAME/: a new folder "
+                         "that 'ros2 bag play' opens, with all files of --split");
     command_->add_option("--seconds", seconds_, "Stop after this many seconds")
         ->check(CLI::PositiveNumber);
     command_->add_option("--split", split_,

@@ -201,6 +201,10 @@ void note_recording(const Recording& recording, ExportReport& report) {
     if (!recording.facts().defect.empty())
         report.notes.push_back(fmt::format("the recording: {}; only what can be read is exported",
                                            recording.facts().defect));
+    for (const std::string& file : recording.facts().missing)
+        report.notes.push_back(fmt::format("the recording: {} is missing", file));
+    for (const std::string& damage : recording.damages())
+        report.notes.push_back(fmt::format("the recording: {}; it is left out", damage));
     const auto gaps = recording.gaps();
     if (!gaps) return;
     std::map<std::string, std::uint64_t> lost;
@@ -288,6 +292,7 @@ std::string imu_topic(const std::string& imu) { return "/" + imu; }
 Expected<ExportReport> export_recording(const ExportSettings& settings) {
     const auto recording = Recording::open(settings.recording);
     if (!recording) return Unexpected(recording.error());
+    recording->check();  // sets of frames are chosen before pixels are read
     auto directory = ExportDirectory::create(settings.directory);
     if (!directory) return Unexpected(directory.error());
     ExportReport report;

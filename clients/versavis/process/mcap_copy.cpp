@@ -10,6 +10,7 @@
 
 #include "base/byte_cursor.hpp"
 #include "posix/file.hpp"
+#include "recording/mcap_record.hpp"
 #include "recording/mcap_summary.hpp"
 
 namespace versavis::client {
@@ -132,10 +133,17 @@ class Copy {
 
     Expected<> copy_chunk(const McapChunk& chunk) {
         const auto records = from_.load(chunk, buffer_);
-        if (!records) return Unexpected(records.error());
+        if (!records) {
+            settings_.damaged(records.error());
+            return {};
+        }
         records_.clear();
         places_.clear();
         SummaryChunk one{};
+        if (auto looked = from_.for_each(chunk, *records,
+                                         [&](const McapRecord& record) { return look_at(record); });
+            !looked)
+            return looked;
         auto read = from_.for_each(
             chunk, *records, [&](const McapRecord& record) { return take_record(record, one); });
         if (!read) return read;
@@ -169,21 +177,57 @@ class Copy {
         return {};
     }
 
-    Expected<bool> take_record(const McapRecord& record, SummaryChunk& one) {
-        const std::string_view content = as_text(record.content);
+    Expected<bool> look_at(const McapRecord& record) {
         ByteCursor cursor(record.content);
         const auto id = cursor.number<std::uint16_t>();
-        if (!cursor.good()) return from_.damaged(record.offset, "a record is too short");
-        if (record.opcode == McapOpcode::schema) summary_.schemas.insert_or_assign(id, content);
+        if (record.opcode == McapOpcode::schema)
+            schemas_.insert_or_assign(id, std::string(as_text(record.content)));
         if (record.opcode == McapOpcode::channel) {
             const auto channel = parse_channel(record.content);
             if (!channel) return from_.damaged(record.offset, "a damaged channel");
-            summary_.channels.insert_or_assign(id, content);
             channels_.insert_or_assign(id, *channel);
         }
-        if (record.opcode == McapOpcode::message) return take_message(record, one);
-        put_record(records_, record.opcode, content);
+        if (record.opcode != McapOpcode::message) return true;
+        const auto message = parse_message(record.content);
+        const auto channel = channels_.find(id);
+        if (message && channel != channels_.end()) settings_.look(channel->second, *message);
         return true;
+    }
+
+    Expected<bool> take_record(const McapRecord& record, SummaryChunk& one) {
+        ByteCursor cursor(record.content);
+        const auto id = cursor.number<std::uint16_t>();
+        if (!cursor.good()) return from_.damaged(record.offset, "a record is too short");
+        if (record.opcode == McapOpcode::message) return take_message(record, one);
+        if (record.opcode == McapOpcode::channel) put_channel(id, as_text(record.content));
+        return true;
+    }
+
+    /// A schema stands before the first channel that uses it; one that none uses is left out.
+    void put_channel(std::uint16_t id, std::string_view content) {
+        const McapChannel& channel = channels_.at(id);
+        if (const auto topic = settings_.convert(channel)) {
+            const auto made = converted_.try_emplace(
+                id, static_cast<std::uint16_t>(UINT16_MAX - converted_.size()));
+            const std::uint16_t schema = made.first->second;
+            put_schema(schema, mcap_schema(schema, *topic));
+            put_definition(McapOpcode::channel, summary_.channels, id,
+                           mcap_channel(id, schema, *topic));
+            return;
+        }
+        if (const auto known = schemas_.find(channel.schema); known != schemas_.end())
+            put_schema(known->first, known->second);
+        put_definition(McapOpcode::channel, summary_.channels, id, std::string(content));
+    }
+
+    void put_schema(std::uint16_t id, const std::string& content) {
+        put_definition(McapOpcode::schema, summary_.schemas, id, content);
+    }
+
+    void put_definition(McapOpcode opcode, std::map<std::uint16_t, std::string>& known,
+                        std::uint16_t id, const std::string& content) {
+        known.insert_or_assign(id, content);
+        put_record(records_, opcode, content);
     }
 
     Expected<bool> take_message(const McapRecord& record, SummaryChunk& one) {
@@ -194,6 +238,7 @@ class Copy {
             return from_.damaged(record.offset, "a message of an undeclared channel");
         const std::uint64_t place = records_.size();
         const auto changed = settings_.change(channel->second, *message);
+        if (changed && changed->dropped) return true;
         const std::uint64_t log_time = changed ? changed->log_time : message->log_time;
         if (changed) {
             std::string content;
@@ -230,6 +275,8 @@ class Copy {
     std::uint64_t at_ = 0;
     std::string records_;
     std::map<std::uint16_t, McapChannel> channels_;
+    std::map<std::uint16_t, std::string> schemas_;      ///< of the old file
+    std::map<std::uint16_t, std::uint16_t> converted_;  ///< of each converted channel its schema
     std::map<std::uint16_t, std::vector<MessagePlace>> places_;
     McapSummary summary_;
 };

@@ -9,19 +9,27 @@
 #include <vector>
 
 #include "recording/mcap_reader.hpp"
+#include "recording/mcap_writer.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {
 
 /// A message with other times or data; none: it stays as it is.
 struct ChangedMessage {
-    std::uint64_t log_time;
-    std::uint64_t publish_time;
-    std::string data;
+    std::uint64_t log_time = 0;
+    std::uint64_t publish_time = 0;
+    std::string data{};
+    bool dropped = false;
 };
 
 struct McapCopySettings {
+    /// What a channel becomes; none: it stays.
+    std::function<std::optional<McapTopic>(const McapChannel&)> convert;
+    /// Gets all messages of a chunk before any of them is changed.
+    std::function<void(const McapChannel&, const McapMessage&)> look;
     std::function<std::optional<ChangedMessage>(const McapChannel&, const McapMessage&)> change;
+    /// A chunk that is left out.
+    std::function<void(const Error&)> damaged;
     McapAttachment added;                     ///< besides those that are there
     std::function<bool(double share)> go_on;  ///< how far it is; false: stop
 };

@@ -8,13 +8,14 @@
 #include <cstring>
 #include <optional>
 
+#include "base/byte_cursor.hpp"
 #include "base/shallow_json.hpp"
 #include "engine/rounding.hpp"
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
 #include "process/stamp_choice.hpp"
-#include "recording/item_fields.hpp"
+#include "recording/item_messages.hpp"
 #include "recording/recording.hpp"
 
 namespace versavis::client {
@@ -126,8 +127,8 @@ class Processing {
         return {};
     }
 
-    std::optional<ChangedMessage> change(const McapChannel& channel,
-                                         const McapMessage& message) const;
+    void look(const McapChannel& channel, const McapMessage& message);
+    std::optional<ChangedMessage> change(const McapChannel& channel, const McapMessage& message);
 
  private:
     Expected<> each(const std::vector<std::string>& names,
@@ -464,9 +465,9 @@ class Processing {
         return found != changes.end() && found->before == before ? &*found : nullptr;
     }
 
-    std::string changed_item(const std::string& name, const Change& change, std::string data) const;
-    std::string changed_text(const std::string& name, const Change& change,
-                             const std::string& data) const;
+    ItemMessage changed(const std::string& name, const Change& change, ItemMessage item) const;
+    const ChannelRole& role(const McapChannel& channel);
+    std::optional<ItemMessage> noted_item(const std::string& stream, std::uint32_t sequence);
     void apply(const std::string& name, const Change& change, FrameMetadata& frame) const;
 
     const Recording& recording_;
@@ -476,11 +477,15 @@ class Processing {
     LiveSigmas live_sigmas_;
     Duration recomputed_off_;  ///< from another clock, where that made the stamps
     std::map<std::string, Stream> streams_;
-};
 
-/// Where an item's parts lie (docs/contracts/recording-format.md).
-constexpr std::size_t item_time_at = 16;
-constexpr std::size_t item_metadata_at = 32;
+    struct Noted {
+        ItemMessage item;
+        std::string payload;
+    };
+    std::map<std::uint16_t, ChannelRole> roles_;
+    std::map<std::pair<std::string, std::uint32_t>, Noted> noted_;
+    std::string payload_;  ///< of the item noted_item() gave
+};
 
 /// Where the stamp of a message with a header lies in its CDR.
 constexpr std::size_t header_stamp_at = 4;
@@ -499,47 +504,21 @@ void Processing::apply(const std::string& name, const Change& change, FrameMetad
     frame.delay_ns = static_cast<std::int32_t>(exposure.delay.ns);
 }
 
-std::string Processing::changed_item(const std::string& name, const Change& change,
-                                     std::string data) const {
-    std::memcpy(data.data() + item_time_at, &change.after.ns, sizeof change.after.ns);
-    ring::Metadata words;
-    std::memcpy(words.data(), data.data() + item_metadata_at, sizeof words);
+ItemMessage Processing::changed(const std::string& name, const Change& change,
+                                ItemMessage item) const {
+    item.time = change.after;
     if (streams_.at(name).kind == ring::StreamKind::frames) {
-        auto frame = unpack<FrameMetadata>(words);
+        auto frame = unpack<FrameMetadata>(item.metadata);
         apply(name, change, frame);
-        words = pack(frame);
+        item.metadata = pack(frame);
     } else {
-        auto sample = unpack<ImuMetadata>(words);
+        auto sample = unpack<ImuMetadata>(item.metadata);
         sample.host_time = change.host;
         sample.sigma_ns = change.sigma_ns;
         sample.flags = change.flags;
-        words = pack(sample);
+        item.metadata = pack(sample);
     }
-    std::memcpy(data.data() + item_metadata_at, words.data(), sizeof words);
-    return data;
-}
-
-/// What each change sets of a stamp as JSON, and what a proved pair sets besides.
-constexpr const char* stamp_fields[] = {"host_time_ns", "sigma_ns",      "kind",
-                                        "suspect",      "holdover",      "clamped",
-                                        "sensor_error", "camera_length", "flags"};
-constexpr const char* pair_fields[] = {"trigger", "tick", "board_time_ns", "exposure_ns",
-                                       "delay_ns"};
-
-/// Of the stamps as JSON. What else a stamp says, in files of any version, stays.
-std::string Processing::changed_text(const std::string& name, const Change& change,
-                                     const std::string& data) const {
-    json stamp = parse_shallow_json(data);
-    if (!stamp.is_object()) return data;
-    FrameMetadata frame{};
-    apply(name, change, frame);
-    json changed;
-    add_fields(changed, ring::StreamKind::frames, pack(frame), ring::no_attributes);
-    stamp["time_ns"] = change.after.ns;
-    for (const char* field : stamp_fields) stamp[field] = changed.at(field);
-    if (change.proof != no_proof)
-        for (const char* field : pair_fields) stamp[field] = changed.at(field);
-    return stamp.dump();
+    return item;
 }
 
 void put_header_stamp(std::string& data, OutputTime time) {
@@ -550,32 +529,103 @@ void put_header_stamp(std::string& data, OutputTime time) {
     std::memcpy(data.data() + header_stamp_at + sizeof s, &ns, sizeof ns);
 }
 
-/// "/NAME/rest" or "/versavis/NAME/rest".
-std::pair<std::string, std::string> parts_of(const std::string& topic) {
-    const std::string own = "/versavis/";
-    const std::size_t begin = topic.rfind(own, 0) == 0 ? own.size() : 1;
-    const std::size_t end = topic.find('/', begin);
-    if (end == std::string::npos) return {};
-    return {topic.substr(begin, end - begin), topic.substr(end + 1)};
+std::optional<ItemMessage> item_of(const ChannelRole& role, const McapMessage& message) {
+    std::uint64_t payload = 0;
+    auto item = role.old ? parse_old_item(message.data, message.data.size(), payload)
+                         : parse_item_message(message.data, payload);
+    if (item) item->kind = role.kind;
+    return item;
+}
+
+std::string_view type_of(Role role) {
+    switch (role) {
+        case Role::item: return item_type;
+        case Role::stamp: return stamp_type;
+        case Role::event: return event_type;
+        case Role::gap: return gap_type;
+        case Role::status: return text_type;
+        default: return {};
+    }
+}
+
+/// Of files before version 2.
+std::optional<McapTopic> converted_topic(const McapChannel& channel) {
+    const ChannelRole role = role_of(channel);
+    if (!role.old || type_of(role.role).empty()) return std::nullopt;
+    const bool item = role.role == Role::item;
+    const std::size_t rest = channel.topic.rfind('/');
+    const bool of_stream = item || role.role == Role::stamp || role.role == Role::gap;
+    return recorded_topic(
+        of_stream ? "/versavis/" + ros_topic_part(role.stream) + channel.topic.substr(rest)
+                  : channel.topic,
+        type_of(role.role), role.stream, item ? std::optional(role.kind) : std::nullopt);
+}
+
+const ChannelRole& Processing::role(const McapChannel& channel) {
+    const auto [known, is_new] = roles_.try_emplace(channel.id);
+    if (is_new) known->second = role_of(channel);
+    return known->second;
+}
+
+void Processing::look(const McapChannel& channel, const McapMessage& message) {
+    const ChannelRole& its = role(channel);
+    const bool noted = its.kind == ring::StreamKind::frames || its.kind == ring::StreamKind::events;
+    const auto item =
+        its.role == Role::item && noted ? item_of(its, message) : std::optional<ItemMessage>();
+    if (!item) return;
+    noted_[{its.stream, message.sequence}] = {*item, std::string(as_text(item->payload))};
+}
+
+/// The item of this chunk that a Stamp or an Event repeats.
+std::optional<ItemMessage> Processing::noted_item(const std::string& stream,
+                                                  std::uint32_t sequence) {
+    auto found = noted_.extract({stream, sequence});
+    if (found.empty()) return std::nullopt;
+    payload_ = std::move(found.mapped().payload);
+    found.mapped().item.payload = std::as_bytes(std::span(payload_));
+    return found.mapped().item;
 }
 
 std::optional<ChangedMessage> Processing::change(const McapChannel& channel,
-                                                 const McapMessage& message) const {
-    const auto [name, rest] = parts_of(channel.topic);
-    const Change* change = change_of(name, {static_cast<std::int64_t>(message.log_time)});
-    if (change == nullptr || rest == "gap") return std::nullopt;
-    std::string data(reinterpret_cast<const char*>(message.data.data()), message.data.size());
-    if (rest == "item") {
-        if (data.size() < item_metadata_at + ring::metadata_size) return std::nullopt;
-        data = changed_item(name, *change, std::move(data));
-    } else if (rest == "stamp") {
-        data = changed_text(name, *change, data);
-    } else {
-        if (channel.encoding != "cdr" || data.size() < header_stamp_at + 8) return std::nullopt;
-        put_header_stamp(data, change->after);
+                                                 const McapMessage& message) {
+    const ChannelRole& its = role(channel);
+    const Change* change = change_of(its.stream, {static_cast<std::int64_t>(message.log_time)});
+    if (its.role == Role::gap) change = nullptr;
+    if (change == nullptr && !its.old) return std::nullopt;
+    ChangedMessage result{message.log_time, message.publish_time};
+    if (change != nullptr)
+        result.log_time = result.publish_time = static_cast<std::uint64_t>(change->after.ns);
+    switch (its.role) {
+        case Role::item:
+        case Role::stamp:
+        case Role::event: {
+            const auto item = its.role == Role::item ? item_of(its, message)
+                                                     : noted_item(its.stream, message.sequence);
+            if (!item) {
+                result.dropped = true;
+                return result;
+            }
+            const ItemMessage made =
+                change == nullptr ? *item : changed(its.stream, *change, *item);
+            result.data =
+                its.role == Role::item ? item_message(made) : note_message(its.stream, made);
+            return result;
+        }
+        case Role::gap: {
+            const auto gap = parse_old_gap(message.data);
+            result.dropped = !gap;
+            if (gap)
+                result.data =
+                    gap_message(its.stream, {static_cast<std::int64_t>(message.log_time)}, *gap);
+            return result;
+        }
+        case Role::status: result.data = text_message(as_text(message.data)); return result;
+        default: break;
     }
-    const auto time = static_cast<std::uint64_t>(change->after.ns);
-    return ChangedMessage{time, time, std::move(data)};
+    if (its.old || message.data.size() < header_stamp_at + 8) return std::nullopt;
+    result.data = as_text(message.data);
+    put_header_stamp(result.data, change->after);
+    return result;
 }
 
 }  // namespace
@@ -588,16 +638,31 @@ Expected<ProcessReport> process_recording(const std::string& path, const std::st
     report.file = output;
     if (!recording->facts().defect.empty())
         report.notes.push_back("the old file was cut off: " + recording->facts().defect);
-    const auto clocks = read_clocks(*recording, [&] { return go_on(0); });
+    const auto& streams = recording->streams();
+    const bool has_clock = std::any_of(streams.begin(), streams.end(), [](const auto& stream) {
+        return stream.kind == ring::StreamKind::clock || stream.kind == ring::StreamKind::events;
+    });
+    if (!has_clock)
+        report.notes.push_back("it has no stamps of the clock: all stamps stay as they are");
+    const auto clocks = has_clock ? read_clocks(*recording, [&] { return go_on(0); })
+                                  : Expected<RecordedClocks>(RecordedClocks{});
     if (!clocks) return Unexpected(clocks.error());
     Processing processing(*recording, *clocks, report, go_on);
     if (const auto planned = processing.plan(); !planned) return Unexpected(planned.error());
     const auto reader = McapReader::open(path);
     if (!reader) return Unexpected(reader.error());
     McapCopySettings settings;
+    settings.convert = converted_topic;
+    settings.look = [&](const McapChannel& channel, const McapMessage& message) {
+        processing.look(channel, message);
+    };
     settings.change = [&](const McapChannel& channel, const McapMessage& message) {
         return processing.change(channel, message);
     };
+    recording->check();
+    for (const std::string& damage : recording->damages())
+        report.notes.push_back("left out: " + damage);
+    settings.damaged = [](const Error&) {};  // check() found the same
     settings.added = {"process.json", "application/json", to_json(report).dump(2) + "\n"};
     settings.go_on = go_on;
     if (const auto copied = copy_mcap(*reader, output, settings); !copied)

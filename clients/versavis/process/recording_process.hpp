@@ -48,7 +48,8 @@ struct ProcessReport {
     std::vector<std::string> notes;
 };
 
-/// Errors: the recording cannot be read, is damaged or has no clock; `output` is there already;
+/// A recording of before version 2 becomes one of today. Without a clock all stamps stay. Errors:
+/// the recording cannot be read or is damaged; `output` is there already;
 /// stopped. Then there is no `output`.
 Expected<ProcessReport> process_recording(const std::string& path, const std::string& output,
                                           const std::function<bool(double share)>& go_on);

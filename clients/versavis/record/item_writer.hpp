@@ -6,8 +6,10 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "recording/item_messages.hpp"
 #include "recording/mcap_writer.hpp"
 #include "recording/ros_messages.hpp"
 #include "versavis/error.hpp"
@@ -58,18 +60,15 @@ class ItemWriter {
         std::int64_t status_ns = 0;  ///< when the status was last written
     };
 
-    std::uint16_t ros_channel(Channels& channels, const std::string& topic,
-                              const std::string& type);
-    std::uint16_t json_channel(Channels& channels, const std::string& topic,
-                               const std::string& schema);
-    std::uint16_t item_channel(Channels& channels, const std::string& stream,
-                               ring::StreamKind kind);
-    void write_item(Channels& channels, const std::string& stream, ring::StreamKind kind,
-                    const ring::Item& item, const std::string& payload);
-    void write_frame_notes(Channels& channels, const std::string& stream, const ring::Item& item);
+    std::uint16_t channel(Channels& channels, const std::string& stream, const std::string& topic,
+                          std::string_view type,
+                          std::optional<ring::StreamKind> kind = std::nullopt);
+    void write_item(Channels& channels, const std::string& stream, const ItemMessage& item);
+    void write_frame_notes(Channels& channels, const std::string& stream, const ItemMessage& item);
     void write_imu(Channels& channels, const std::string& stream, const ring::Item& item);
-    void write_event(Channels& channels, const ring::Item& item);
-    void write_status(Channels& channels, const ring::Item& item, const std::string& document);
+    void write_event(Channels& channels, const std::string& stream, const ItemMessage& item);
+    void write_status(Channels& channels, const std::string& stream, const ring::Item& item,
+                      const std::string& document);
 
     McapWriter file_;
     std::map<std::string, RosLens> lenses_;

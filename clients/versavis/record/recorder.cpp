@@ -22,6 +22,7 @@
 #include "record/item_writer.hpp"
 #include "record/png_encoder.hpp"
 #include "record/write_back.hpp"
+#include "recording/bag_metadata.hpp"
 #include "recording/kalibr_yaml.hpp"
 #include "status/status_document.hpp"
 #include "versavis/ring_path.hpp"
@@ -150,6 +151,7 @@ class Recorder {
     Expected<> read_calibration();
     Expected<> read_lenses(const std::string& camchain, const std::string& path);
     Expected<> choose_file();
+    Expected<> describe_folder() const;
     void go_back();
     void look_for_streams();
     void wait_for_streams();
@@ -179,6 +181,7 @@ class Recorder {
     WaitSet waiting_;
     std::optional<ItemWriter> writer_;
     bool file_open_ = false;
+    std::string folder_;  ///< of all files, with metadata.yaml; empty: none was named
     WriteBack write_back_;
     std::optional<TaskQueue<PngFrame>> png_frames_;
     std::vector<Content> attachments_;
@@ -226,10 +229,11 @@ void Recorder::go_back() {
         if (item) newest = newest ? std::max(*newest, item->time) : item->time;
     }
     if (!newest) return;
+    report_.from = *newest - *settings_.before;
     for (const auto& source : sources_) {
         if (!has_stamps(source->kind())) continue;
         source->reader.seek(ring::Position::oldest);
-        source->from = *newest - *settings_.before;
+        source->from = report_.from;
     }
 }
 
@@ -329,6 +333,15 @@ void Recorder::keep_configuration(const nlohmann::json& status) {
 /// A name that is taken must not end the recording when its turn comes.
 Expected<> Recorder::choose_file() {
     report_.files.push_back(settings_.output.empty() ? default_name() : settings_.output);
+    if (std::string& first = report_.files.front(); first.ends_with('/')) {
+        const auto folder = std::filesystem::path(first).parent_path();
+        std::error_code error;
+        if (!std::filesystem::create_directory(folder, error))
+            return error ? not_written(folder.string(), error.value())
+                         : not_written(folder.string(), EEXIST);
+        folder_ = folder.string();
+        first = (folder / folder.filename()).string() + ".mcap";
+    }
     const bool split = settings_.split_bytes > 0 || settings_.split_length;
     const auto taken = split ? later_file(report_.files.front()) : std::nullopt;
     if (!taken) return {};
@@ -346,7 +359,7 @@ Expected<> Recorder::begin_file() {
     file_open_ = true;
     file_begun_ = host_now();
     const auto status = read_status(settings_.instance);
-    std::map<std::string, std::string> facts{{"version", "1"},
+    std::map<std::string, std::string> facts{{"version", "2"},
                                              {"instance", settings_.instance},
                                              {"recording", id_},
                                              {"part", std::to_string(part)},
@@ -561,6 +574,14 @@ void Recorder::stop_early(const Error& why) {
     closed_bytes_ += writer_->file().size();
 }
 
+/// For readers that open a folder as one recording.
+Expected<> Recorder::describe_folder() const {
+    if (folder_.empty()) return {};
+    const auto text = bag_metadata(report_.files);
+    if (!text) return Unexpected(text.error());
+    return write_whole_file(folder_ + "/metadata.yaml", *text);
+}
+
 Expected<RecordReport> Recorder::run() {
     if (auto read = read_calibration(); !read) return Unexpected(read.error());
     if (auto opened = open_streams(); !opened) return Unexpected(opened.error());
@@ -577,6 +598,8 @@ Expected<RecordReport> Recorder::run() {
     if (done) done = write_png_frames(true);
     if (done) done = end_file();
     if (!done) stop_early(done.error());
+    if (auto described = describe_folder(); !described && !report_.stopped_early)
+        report_.stopped_early = described.error();
     report_.duration = host_now() - begun_;
     report_.bytes = closed_bytes_;
     return std::move(report_);

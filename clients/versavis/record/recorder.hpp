@@ -32,6 +32,7 @@ struct RecordReport {
     std::map<std::string, StreamReport> streams;
     std::uint64_t slips = 0;             ///< of the pairing, by events
     std::vector<std::string> left_out;   ///< streams that could not be read, and why
+    std::optional<OutputTime> from;      ///< where `before` wanted it to begin
     std::optional<Error> stopped_early;  ///< the disk's; what was written before is good
 
     std::uint64_t items() const;
@@ -41,7 +42,9 @@ struct RecordReport {
 struct RecordSettings {
     std::string instance;
     std::vector<std::string> streams;  ///< none: all, also those that come later
-    std::string output;                ///< file; empty: `versavis-DATE-TIME.mcap`
+    /// File; empty: `versavis-DATE-TIME.mcap`. With '/' at its end a new folder: NAME/NAME.mcap,
+    /// further files, and metadata.yaml.
+    std::string output;
     std::optional<Duration> length;
     std::uint64_t split_bytes = 0;  ///< 0: one file
     std::optional<Duration> split_length;

@@ -3,9 +3,11 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <lz4frame.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -41,11 +43,56 @@ constexpr std::uint64_t content_limit = 64 << 20U;
 /// would not fit into them.
 constexpr std::uint64_t chunk_limit = 0xFFFFFFFF;
 
+/// A chunk that claims to hold more than so many times its size is none. zstd does 20 or so.
+constexpr std::uint64_t unpacked_limit = 1 << 15U;
+
 std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
 
 std::uint32_t crc_read(std::uint32_t crc, std::span<const std::byte> bytes) {
     return static_cast<std::uint32_t>(
         crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+bool can_unpack(const std::string& compression) {
+    return compression.empty() || compression == "lz4" || compression == "zstd";
+}
+
+/// False: damaged, or of another size than `records`.
+bool unpack_lz4(std::span<const std::byte> packed, std::span<std::byte> records) {
+    LZ4F_dctx* context = nullptr;
+    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
+    std::size_t done = 0;
+    std::size_t hint = 1;
+    while (hint != 0 && !packed.empty()) {
+        std::size_t into = records.size() - done;
+        std::size_t from = packed.size();
+        hint =
+            LZ4F_decompress(context, records.data() + done, &into, packed.data(), &from, nullptr);
+        if (LZ4F_isError(hint) != 0 || (into == 0 && from == 0)) break;
+        done += into;
+        packed = packed.subspan(from);
+    }
+    LZ4F_freeDecompressionContext(context);
+    return hint == 0 && done == records.size();
+}
+
+bool unpack_zstd(std::span<const std::byte> packed, std::span<std::byte> records) {
+    return ZSTD_decompress(records.data(), records.size(), packed.data(), packed.size()) ==
+           records.size();
+}
+
+/// Where the data end the summary begins, and it is made anew.
+bool ends_data(McapOpcode opcode) {
+    switch (opcode) {
+        case McapOpcode::data_end:
+        case McapOpcode::footer:
+        case McapOpcode::statistics:
+        case McapOpcode::chunk_index:
+        case McapOpcode::attachment_index:
+        case McapOpcode::metadata_index:
+        case McapOpcode::summary_offset: return true;
+        default: return false;
+    }
 }
 
 std::map<std::string, std::string> text_map(ByteCursor& cursor) {
@@ -155,6 +202,16 @@ Expected<McapReader> McapReader::open(const std::string& path) {
     if (auto begun = reader.read_header(); !begun) return Unexpected(begun.error());
     if (auto read = reader.read_summary(); !read) {
         reader.defect_ = read.error().what;
+        reader.scan();
+    } else if (!reader.damages_.empty()) {
+        // It may point beside what is there.
+        const auto channels = std::move(reader.channels_);
+        const auto schemas = std::move(reader.schemas_);
+        reader.forget();
+        reader.channels_ = channels;
+        reader.schemas_ = schemas;
+        reader.defect_ = "what its summary points to is damaged";
+        reader.good_end_ = reader.data_begin_;
         reader.scan();
     }
     reader.claimed_.clear();
@@ -281,7 +338,9 @@ Expected<> McapReader::take_summary_record(Window& window, const McapRecord& rec
         case McapOpcode::statistics: {
             McapStatistics statistics{};
             statistics.messages = cursor.number<std::uint64_t>();
-            cursor.bytes(2 + 4 * 4 + 2 * 8);
+            cursor.bytes(2 + 4 * 4);
+            statistics.start_time = cursor.number<std::uint64_t>();
+            statistics.end_time = cursor.number<std::uint64_t>();
             ByteCursor counts(cursor.bytes(cursor.number<std::uint32_t>()));
             while (counts.left() > 0 && counts.good()) {
                 const auto channel = counts.number<std::uint16_t>();
@@ -297,15 +356,28 @@ Expected<> McapReader::take_summary_record(Window& window, const McapRecord& rec
             if (!cursor.good() || offset < data_begin_)
                 return damaged(record.offset, "an index of a chunk");
             auto chunk = chunk_at(window, offset);
-            if (!chunk) return Unexpected(chunk.error());
+            if (!chunk) {
+                skip(chunk.error(), offset);
+                return {};
+            }
             if (auto claimed = claim(offset, chunk->end()); !claimed) return claimed;
             chunks_.push_back(std::move(*chunk));
             break;
         }
         case McapOpcode::attachment_index:
-            return add_attachment(window, cursor.number<std::uint64_t>());
-        case McapOpcode::metadata_index:
-            return add_metadata(window, cursor.number<std::uint64_t>());
+        case McapOpcode::metadata_index: {
+            const bool attachment = record.opcode == McapOpcode::attachment_index;
+            const auto offset = cursor.number<std::uint64_t>();
+            const auto length = cursor.number<std::uint64_t>();
+            if (!cursor.good() || offset > size_ || length > size_ - offset)
+                return damaged(record.offset, "an index points beyond the file");
+            if (auto claimed = claim(offset, offset + std::max<std::uint64_t>(length, 1)); !claimed)
+                return claimed;
+            const auto added =
+                attachment ? add_attachment(window, offset) : add_metadata(window, offset);
+            if (!added) skip(added.error(), offset);
+            return {};
+        }
         default: break;
     }
     return cursor.good() ? Expected<>() : damaged(record.offset, "a record is too short");
@@ -322,8 +394,13 @@ Expected<> McapReader::claim(std::uint64_t begin, std::uint64_t end) {
     return {};
 }
 
+void McapReader::skip(const Error& damage, std::uint64_t offset) {
+    damages_.push_back({offset, damage.what});
+}
+
 void McapReader::forget() {
     claimed_.clear();
+    damages_.clear();
     chunks_.clear();
     channels_.clear();
     schemas_.clear();
@@ -332,14 +409,96 @@ void McapReader::forget() {
     attachments_.clear();
 }
 
+/// From record to record; from one that is damaged to the next one that is whole.
 void McapReader::scan() {
     Window window(*this, size_, glance_size);
-    while (good_end_ < size_) {
-        const auto record = window.record(good_end_);
-        if (!record || !take_record(window, *record)) break;
-        good_end_ = record->end();
+    std::optional<std::uint64_t> index;  // the last record, if it is one: it may be cut short, too
+    for (std::uint64_t at = data_begin_; at < size_;) {
+        const auto record = window.record(at);
+        if (record && ends_data(record->opcode) && is_plausible(window, *record)) break;
+        if (record && is_plausible(window, *record) && take_record(window, *record)) {
+            index.reset();
+            if (record->opcode == McapOpcode::message_index) index = at;
+            at = good_end_ = record->end();
+            continue;
+        }
+        if (index) at = *std::exchange(index, std::nullopt);
+        const std::uint64_t next = next_record(window, at + 1);
+        if (next >= size_) break;
+        damages_.push_back(
+            {at, fmt::format("damaged at byte {}: {} bytes cannot be read", at, next - at)});
+        at = next;
     }
     drop_damaged_end();
+}
+
+/// What a record of its kind must be, so that damage is not taken for one.
+bool McapReader::is_plausible(Window& window, const McapRecord& record) const {
+    const auto follows = [&] {
+        if (record.end() == size_) return true;
+        const auto next = window.at(record.end(), 1);
+        if (!next || next->empty()) return false;
+        const auto opcode = static_cast<std::uint8_t>((*next)[0]);
+        return opcode >= static_cast<std::uint8_t>(McapOpcode::header) &&
+               opcode <= static_cast<std::uint8_t>(McapOpcode::data_end);
+    };
+    ByteCursor cursor(record.content);
+    // Of one that is larger only the beginning is looked at.
+    const auto ends_there = [&](const ByteCursor& read) {
+        return record.length > record.content.size() || (read.good() && read.left() == 0);
+    };
+    switch (record.opcode) {
+        case McapOpcode::chunk:
+        case McapOpcode::attachment: return true;  // they are checked when they are taken
+        case McapOpcode::metadata:
+            cursor.text();
+            text_map(cursor);
+            return ends_there(cursor) && follows();
+        case McapOpcode::schema:
+            cursor.number<std::uint16_t>();
+            for (int text = 0; text < 3; ++text) cursor.text();
+            return ends_there(cursor) && follows();
+        case McapOpcode::channel:
+            cursor.number<std::uint32_t>();  // its own number, and that of its schema
+            for (int text = 0; text < 2; ++text) cursor.text();
+            text_map(cursor);
+            return ends_there(cursor) && follows();
+        case McapOpcode::message: return record.length >= mcap_message_header && follows();
+        case McapOpcode::message_index: {
+            cursor.number<std::uint16_t>();
+            const auto size = cursor.number<std::uint32_t>();
+            return cursor.good() && size % 16 == 0 && size + 6U == record.length;
+        }
+        case McapOpcode::data_end: return record.length == 4;
+        default: return ends_data(record.opcode) && follows();
+    }
+}
+
+/// The first from there on that is a chunk, attachment, or another one that is whole; size(): none.
+std::uint64_t McapReader::next_record(Window& window, std::uint64_t from) const {
+    for (std::uint64_t at = from; at < size_;) {
+        const auto bytes = window.at(at, glance_size);
+        if (!bytes || bytes->empty()) return size_;
+        const std::vector<std::byte> block(bytes->begin(), bytes->end());
+        for (std::size_t i = 0; i < block.size(); ++i) {
+            const auto opcode = static_cast<McapOpcode>(block[i]);
+            const bool chunked = opcode == McapOpcode::chunk || opcode == McapOpcode::attachment;
+            const bool alone = opcode == McapOpcode::schema || opcode == McapOpcode::channel ||
+                               opcode == McapOpcode::message;
+            // What lies in a damaged chunk has no checksum that holds: it is not looked for.
+            if (!chunked && !(alone && chunks_.empty() && !loose_.empty())) continue;
+            const auto record = window.record(at + i);
+            if (!record || record->opcode != opcode) continue;
+            if (opcode == McapOpcode::chunk) {
+                if (chunk_at(window, at + i)) return at + i;
+            } else if (record->length < content_limit && is_plausible(window, *record) &&
+                       (opcode != McapOpcode::attachment || has_attachment(*record))) {
+                return at + i;
+            }
+        }
+        at += block.size();
+    }
+    return size_;
 }
 
 /// False: here begins what cannot be read.
@@ -347,17 +506,50 @@ bool McapReader::take_record(Window& window, const McapRecord& record) {
     switch (record.opcode) {
         case McapOpcode::chunk: {
             auto chunk = chunk_at(window, record.offset);
-            if (chunk) chunks_.push_back(std::move(*chunk));
-            return chunk.has_value();
+            if (!chunk) return false;
+            // Where bytes of it are missing, it reaches into what follows.
+            McapBuffer buffer;
+            if (!is_followed(window, chunk->end()) && !load(*chunk, buffer)) return false;
+            chunks_.push_back(std::move(*chunk));
+            return true;
         }
-        case McapOpcode::attachment: return add_attachment(window, record.offset).has_value();
+        case McapOpcode::attachment:
+            if (!is_followed(window, record.end()) && !has_attachment(record)) return false;
+            return add_attachment(window, record.offset).has_value();
         case McapOpcode::metadata: return add_metadata(window, record.offset).has_value();
         case McapOpcode::schema:
         case McapOpcode::channel:
-        case McapOpcode::message:
+        case McapOpcode::message: loose_.push_back(record.offset); return true;
         case McapOpcode::message_index: return true;
-        default: return false;  // where the data end the summary begins, and it is made anew
+        default: return false;
     }
+}
+
+bool McapReader::is_followed(Window& window, std::uint64_t at) const {
+    if (at == size_) return true;
+    const auto next = window.record(at);
+    if (!next || !is_plausible(window, *next)) return false;
+    return next->opcode != McapOpcode::chunk || chunk_at(window, at).has_value();
+}
+
+bool McapReader::has_attachment(const McapRecord& record) const {
+    const auto content = content_of(record);
+    if (!content || content->size() < 32) return false;
+    std::uint32_t crc = 0;
+    std::memcpy(&crc, content->data() + content->size() - 4, sizeof crc);
+    return crc != 0 &&
+           crc_read(crc_read(0, {}), std::span(*content).first(content->size() - 4)) == crc;
+}
+
+Expected<McapRecord> McapReader::loose_record(std::uint64_t offset,
+                                              std::vector<std::byte>& content) const {
+    Window window(*this, size_, glance_size);
+    auto record = window.record(offset);
+    if (!record) return record;
+    content.resize(record->length);
+    if (auto got = read(record->content_offset(), content); !got) return Unexpected(got.error());
+    record->content = content;
+    return record;
 }
 
 /// After a loss of power the last chunks may be there by their length only.
@@ -366,8 +558,8 @@ void McapReader::drop_damaged_end() {
     std::size_t dropped = 0;
     while (!chunks_.empty()) {
         const McapChunk& last = chunks_.back();
+        if (!can_unpack(last.compression)) break;
         const auto records = load(last, buffer);
-        if (!last.compression.empty()) break;
         if (records && for_each(last, *records, [](const McapRecord&) { return true; })) break;
         good_end_ = last.offset;
         chunks_.pop_back();
@@ -381,8 +573,8 @@ Expected<McapChunk> McapReader::chunk_at(Window& window, std::uint64_t offset) c
     if (!record) return Unexpected(record.error());
     ByteCursor cursor(record->content);
     cursor.bytes(16);
-    const auto uncompressed = cursor.number<std::uint64_t>();
     McapChunk chunk{};
+    chunk.unpacked = cursor.number<std::uint64_t>();
     chunk.offset = offset;
     chunk.crc = cursor.number<std::uint32_t>();
     chunk.compression = cursor.text();
@@ -391,7 +583,7 @@ Expected<McapChunk> McapReader::chunk_at(Window& window, std::uint64_t offset) c
     const bool fits = cursor.good() && cursor.at() <= record->length &&
                       chunk.records_size == record->length - cursor.at();
     if (record->opcode != McapOpcode::chunk || !fits ||
-        (chunk.compression.empty() && uncompressed != chunk.records_size))
+        (chunk.compression.empty() && chunk.unpacked != chunk.records_size))
         return damaged(offset, "a chunk's sizes contradict each other");
     return chunk;
 }
@@ -407,7 +599,6 @@ Expected<> McapReader::add_attachment(Window& window, std::uint64_t offset) {
     if (!record) return Unexpected(record.error());
     if (record->opcode != McapOpcode::attachment)
         return damaged(offset, "no attachment, as the summary says");
-    if (auto claimed = claim(offset, record->end()); !claimed) return claimed;
     auto content = content_of(*record);
     if (!content) return Unexpected(content.error());
     ByteCursor cursor(*content);
@@ -434,7 +625,6 @@ Expected<> McapReader::add_metadata(Window& window, std::uint64_t offset) {
     if (!record) return Unexpected(record.error());
     if (record->opcode != McapOpcode::metadata)
         return damaged(offset, "no metadata, as the summary says");
-    if (auto claimed = claim(offset, record->end()); !claimed) return claimed;
     auto content = content_of(*record);
     if (!content) return Unexpected(content.error());
     ByteCursor cursor(*content);
@@ -447,28 +637,52 @@ Expected<> McapReader::add_metadata(Window& window, std::uint64_t offset) {
 }
 
 Expected<> McapReader::check_readable(const McapChunk& chunk) const {
-    if (!chunk.compression.empty())
+    if (!can_unpack(chunk.compression))
         return failure(
             path_,
             fmt::format("the chunk at byte {} is compressed ({})", chunk.offset, chunk.compression),
             "decompress it first, with 'mcap decompress' for example");
-    if (chunk.records_size > chunk_limit)
+    if (chunk.records_size > chunk_limit || chunk.unpacked > chunk_limit ||
+        chunk.unpacked / unpacked_limit > chunk.records_size)
         return failure(path_, fmt::format("the chunk at byte {} has {} MiB, more than can be read",
-                                          chunk.offset, chunk.records_size >> 20U));
+                                          chunk.offset, chunk.unpacked >> 20U));
     return {};
+}
+
+Expected<std::span<const std::byte>> McapReader::unpack(const McapChunk& chunk,
+                                                        McapBuffer& buffer) const {
+    McapBuffer packed_buffer;
+    const auto packed = packed_buffer.take(chunk.records_size);
+    const auto records = buffer.take(chunk.unpacked);
+    if (!packed || !records)
+        return failure(path_, fmt::format("the chunk at byte {} needs {} MiB of memory",
+                                          chunk.offset, chunk.unpacked >> 20U));
+    if (auto got = read(chunk.records_offset, *packed); !got) return Unexpected(got.error());
+    const bool good =
+        chunk.compression == "lz4" ? unpack_lz4(*packed, *records) : unpack_zstd(*packed, *records);
+    if (!good) return damaged(chunk.offset, "the chunk cannot be unpacked");
+    return std::span<const std::byte>(*records);
 }
 
 Expected<std::span<const std::byte>> McapReader::load(const McapChunk& chunk,
                                                       McapBuffer& buffer) const {
     if (auto readable = check_readable(chunk); !readable) return Unexpected(readable.error());
-    const auto records = buffer.take(chunk.records_size);
-    if (!records)
-        return failure(path_, fmt::format("the chunk at byte {} needs {} MiB of memory",
-                                          chunk.offset, chunk.records_size >> 20U));
-    if (auto got = read(chunk.records_offset, *records); !got) return Unexpected(got.error());
-    if (chunk.crc != 0 && crc_read(crc_read(0, {}), *records) != chunk.crc)
+    std::span<const std::byte> records;
+    if (!chunk.compression.empty()) {
+        const auto unpacked = unpack(chunk, buffer);
+        if (!unpacked) return unpacked;
+        records = *unpacked;
+    } else {
+        const auto taken = buffer.take(chunk.records_size);
+        if (!taken)
+            return failure(path_, fmt::format("the chunk at byte {} needs {} MiB of memory",
+                                              chunk.offset, chunk.records_size >> 20U));
+        if (auto got = read(chunk.records_offset, *taken); !got) return Unexpected(got.error());
+        records = *taken;
+    }
+    if (chunk.crc != 0 && crc_read(crc_read(0, {}), records) != chunk.crc)
         return damaged(chunk.offset, "the chunk differs from its checksum");
-    return std::span<const std::byte>(*records);
+    return records;
 }
 
 Expected<> McapReader::for_each(const McapChunk& chunk, std::span<const std::byte> records,
@@ -504,6 +718,12 @@ Expected<> McapReader::top_level(const Visit& visit) const {
 
 Expected<> McapReader::glance(const McapChunk& chunk, const Visit& visit) const {
     if (auto readable = check_readable(chunk); !readable) return readable;
+    if (!chunk.compression.empty()) {
+        McapBuffer buffer;
+        const auto records = load(chunk, buffer);
+        if (!records) return Unexpected(records.error());
+        return for_each(chunk, *records, visit);
+    }
     Window window(*this, chunk.end(), glance_size);
     for (std::uint64_t at = chunk.records_offset; at < chunk.end();) {
         const auto record = window.record(at);

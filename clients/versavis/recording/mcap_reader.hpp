@@ -49,11 +49,18 @@ struct McapRecord {
 struct McapChunk {
     std::uint64_t offset;  ///< of its opcode
     std::uint64_t records_offset;
-    std::uint64_t records_size;
-    std::uint32_t crc;  ///< of the records; 0: not given
-    std::string compression;
+    std::uint64_t records_size;  ///< in the file
+    std::uint32_t crc;           ///< of the records; 0: not given
+    std::string compression;     ///< "", lz4 or zstd
+    std::uint64_t unpacked = 0;  ///< size of the records
 
     std::uint64_t end() const { return records_offset + records_size; }
+};
+
+/// What cannot be read, and is passed over.
+struct McapDamage {
+    std::uint64_t offset;
+    std::string what;  ///< with the place
 };
 
 struct McapSchema {
@@ -83,6 +90,8 @@ struct McapMetadata {
 
 struct McapStatistics {
     std::uint64_t messages;
+    std::uint64_t start_time;  ///< log times
+    std::uint64_t end_time;
     std::map<std::uint16_t, std::uint64_t> of_channel;
 };
 
@@ -135,9 +144,18 @@ class McapReader {
     /// Of a file with a defect: behind the last record that is whole.
     std::uint64_t good_end() const { return good_end_; }
 
+    /// Places among what is whole that are not. Chunks are not looked into.
+    const std::vector<McapDamage>& damages() const { return damages_; }
+
+    /// Schemas, channels and messages outside of chunks, of a file with a defect.
+    const std::vector<std::uint64_t>& loose() const { return loose_; }
+
+    /// The record at such a place, whole.
+    Expected<McapRecord> loose_record(std::uint64_t offset, std::vector<std::byte>& content) const;
+
     const std::vector<McapChunk>& chunks() const { return chunks_; }
 
-    /// Only of a file without defect; else they are met in the chunks.
+    /// Of a file with a summary; else they are met in the chunks.
     const std::vector<McapChannel>& channels() const { return channels_; }
     const std::map<std::uint16_t, McapSchema>& schemas() const { return schemas_; }
     const std::optional<McapStatistics>& statistics() const { return statistics_; }
@@ -146,6 +164,9 @@ class McapReader {
 
     /// One that is larger than 64 MiB has no content here.
     const std::vector<McapAttachment>& attachments() const { return attachments_; }
+
+    /// Error: its compression is not known, or it is too large.
+    Expected<> check_readable(const McapChunk& chunk) const;
 
     /// Reads a chunk's records and checks them against their CRC. What is returned lies in
     /// `buffer`.
@@ -170,7 +191,6 @@ class McapReader {
     class Window;
 
     McapReader(std::string path, FileDescriptor file, std::uint64_t size);
-    Expected<> check_readable(const McapChunk& chunk) const;
     Expected<> read_header();
     Expected<> read_summary();
     Expected<> check_summary(std::uint64_t begin, std::uint64_t end, std::uint32_t crc) const;
@@ -178,7 +198,13 @@ class McapReader {
     Expected<> take_summary_record(Window& window, const McapRecord& record);
     void scan();
     bool take_record(Window& window, const McapRecord& record);
+    bool is_plausible(Window& window, const McapRecord& record) const;
+    std::uint64_t next_record(Window& window, std::uint64_t from) const;
+    void skip(const Error& damage, std::uint64_t offset);
+    bool is_followed(Window& window, std::uint64_t at) const;
+    bool has_attachment(const McapRecord& record) const;
     void drop_damaged_end();
+    Expected<std::span<const std::byte>> unpack(const McapChunk& chunk, McapBuffer& buffer) const;
     Expected<McapChunk> chunk_at(Window& window, std::uint64_t offset) const;
     Expected<> claim(std::uint64_t begin, std::uint64_t end);
     Expected<> add_attachment(Window& window, std::uint64_t offset);
@@ -195,6 +221,8 @@ class McapReader {
     std::uint64_t data_begin_ = 0;
     std::uint64_t good_end_ = 0;
     std::map<std::uint64_t, std::uint64_t> claimed_;  ///< of what was found: begin and end
+    std::vector<McapDamage> damages_;
+    std::vector<std::uint64_t> loose_;
     std::vector<McapChunk> chunks_;
     std::vector<McapChannel> channels_;
     std::map<std::uint16_t, McapSchema> schemas_;

@@ -23,7 +23,9 @@ std::string chunk_index(const SummaryChunk& chunk) {
         McapOpcode::chunk_index,
         mcap_number(chunk.start_time) + mcap_number(chunk.end_time) + mcap_number(chunk.offset) +
             mcap_number(chunk.length) + entries(chunk.indexes) + mcap_number(chunk.indexes_length) +
-            mcap_text("") + mcap_number(chunk.records_size) + mcap_number(chunk.records_size));
+            mcap_text(chunk.compression) +
+            mcap_number(chunk.compression.empty() ? chunk.records_size : chunk.packed_size) +
+            mcap_number(chunk.records_size));
 }
 
 std::string attachment_index(const SummaryAttachment& one) {

@@ -18,6 +18,8 @@ struct SummaryChunk {
     std::map<std::uint16_t, std::uint64_t> indexes;  ///< where its message indexes lie
     std::uint64_t indexes_length;
     std::uint64_t records_size;
+    std::string compression{};
+    std::uint64_t packed_size = 0;  ///< of records that are compressed
 };
 
 struct SummaryAttachment {

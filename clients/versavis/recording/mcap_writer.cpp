@@ -42,19 +42,30 @@ std::uint32_t crc_of(std::uint32_t before, std::span<const std::byte> bytes) {
 
 }  // namespace
 
+std::string mcap_schema(std::uint16_t id, const McapTopic& topic) {
+    return mcap_number(id) + mcap_text(topic.schema) + mcap_text(topic.schema_encoding) +
+           mcap_text(topic.schema_text);
+}
+
+std::string mcap_channel(std::uint16_t id, std::uint16_t schema, const McapTopic& topic) {
+    return mcap_number(id) + mcap_number(schema) + mcap_text(topic.name) +
+           mcap_text(topic.encoding) + mcap_map(topic.metadata);
+}
+
 McapWriter::McapWriter(std::string path, FileDescriptor file)
     : path_(std::move(path)),
       file_(std::move(file)),
       ahead_(reserved_ahead),
       summary_room_(summary_base) {}
 
-Expected<McapWriter> McapWriter::create(const std::string& path, const std::string& library) {
+Expected<McapWriter> McapWriter::create(const std::string& path, const std::string& library,
+                                        const std::string& profile) {
     auto file = create_file(path, O_RDWR);
     if (!file) return Unexpected(file.error());
     ::flock(file->get(), LOCK_EX | LOCK_NB);
     McapWriter writer(path, std::move(*file));
     writer.pending_ =
-        mcap_magic + mcap_record(McapOpcode::header, mcap_text("ros2") + mcap_text(library));
+        mcap_magic + mcap_record(McapOpcode::header, mcap_text(profile) + mcap_text(library));
     if (auto written = writer.flush(); !written) {
         ::unlink(path.c_str());
         return Unexpected(written.error());
@@ -64,14 +75,9 @@ Expected<McapWriter> McapWriter::create(const std::string& path, const std::stri
 
 std::uint16_t McapWriter::add(const McapTopic& topic) {
     const std::uint16_t id = ++channels_;
-    const std::string number = mcap_number(id);
-    summary_.schemas[id] = number + mcap_text(topic.schema) + mcap_text(topic.schema_encoding) +
-                           mcap_text(topic.schema_text);
-    summary_.channels[id] = number + number + mcap_text(topic.name) + mcap_text(topic.encoding) +
-                            mcap_map(topic.metadata);
-    unwritten_channels_[id] = mcap_record(McapOpcode::schema, summary_.schemas[id]) +
-                              mcap_record(McapOpcode::channel, summary_.channels[id]);
-    summary_room_ += unwritten_channels_[id].size() + summary_entry;
+    summary_.schemas[id] = mcap_schema(id, topic);
+    summary_.channels[id] = mcap_channel(id, id, topic);
+    summary_room_ += summary_.schemas[id].size() + summary_.channels[id].size() + summary_entry;
     return id;
 }
 
@@ -89,11 +95,9 @@ Expected<> McapWriter::write(const MessageHead& message, const std::string& data
 
 void McapWriter::begin_message(const MessageHead& message, std::uint64_t length) {
     if (!chunk_open_) begin_chunk();
-    if (const auto channel = unwritten_channels_.find(message.channel);
-        channel != unwritten_channels_.end()) {
-        pending_ += channel->second;
-        unwritten_channels_.erase(channel);
-    }
+    if (announced_.insert(message.channel).second)
+        pending_ += mcap_record(McapOpcode::schema, summary_.schemas[message.channel]) +
+                    mcap_record(McapOpcode::channel, summary_.channels[message.channel]);
     sum();
     mark_ = {size(), crc_, message.channel, first_time_, last_time_};
     const auto time = static_cast<std::uint64_t>(message.time_ns);
@@ -102,7 +106,7 @@ void McapWriter::begin_message(const MessageHead& message, std::uint64_t length)
     places_[message.channel].push_back({time, records_size()});
     pending_ += mcap_record_head(McapOpcode::message, mcap_message_header + length) +
                 mcap_number(message.channel) + mcap_number(message.sequence) + mcap_number(time) +
-                mcap_number(time);
+                mcap_number(message.publish_time.value_or(time));
 }
 
 void McapWriter::take_back() {
@@ -123,6 +127,7 @@ void McapWriter::begin_chunk() {
     pending_ += chunk_head(unended);
     summed_ = pending_.size();
     chunk_open_ = true;
+    announced_.clear();
     crc_ = 0;
     first_time_ = std::numeric_limits<std::uint64_t>::max();
     last_time_ = 0;

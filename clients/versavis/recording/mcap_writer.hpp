@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,10 +27,15 @@ struct McapTopic {
     std::map<std::string, std::string> metadata{};
 };
 
+/// Contents of the records that announce it.
+std::string mcap_schema(std::uint16_t id, const McapTopic& topic);
+std::string mcap_channel(std::uint16_t id, std::uint16_t schema, const McapTopic& topic);
+
 struct MessageHead {
     std::uint16_t channel = 0;
     std::uint32_t sequence = 0;
     std::int64_t time_ns = 0;
+    std::optional<std::uint64_t> publish_time{};  ///< none: the same
 };
 
 /// All errors are the disk's: the file is then good up to its last whole chunk, and close() may
@@ -37,13 +44,15 @@ class McapWriter {
  public:
     /// Makes the file, and locks it: `versavis repair` leaves it alone. Errors: it is there
     /// already, it cannot be made.
-    static Expected<McapWriter> create(const std::string& path, const std::string& library);
+    static Expected<McapWriter> create(const std::string& path, const std::string& library,
+                                       const std::string& profile = "ros2");
 
     McapWriter(McapWriter&&) noexcept = default;
     McapWriter& operator=(McapWriter&&) noexcept = default;
     ~McapWriter() = default;
 
-    /// Told in the file before its first message.
+    /// Announced in each chunk before its first message there: a chunk that is damaged takes
+    /// nothing from others.
     std::uint16_t add(const McapTopic& topic);
 
     /// Held until the chunk ends, or a message with a body is written.
@@ -109,7 +118,6 @@ class McapWriter {
     std::size_t summed_ = 0;      ///< bytes of it that the chunk's checksum has
     McapSummary summary_;
     std::uint64_t summary_room_;  ///< bytes that it takes, and a little more
-    std::map<std::uint16_t, std::string> unwritten_channels_;  ///< channels without a message yet
     std::uint16_t channels_ = 0;
 
     bool chunk_open_ = false;
@@ -117,6 +125,7 @@ class McapWriter {
     std::uint32_t crc_ = 0;
     std::uint64_t first_time_ = 0;
     std::uint64_t last_time_ = 0;
+    std::set<std::uint16_t> announced_;  ///< channels in this chunk
     std::map<std::uint16_t, std::vector<MessagePlace>> places_;
     Mark mark_;
 };

@@ -11,89 +11,17 @@
 
 #include "base/byte_cursor.hpp"
 #include "base/plausible_time.hpp"
-#include "base/shallow_json.hpp"
+#include "recording/item_messages.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
-#include "versavis/ring_path.hpp"
 
 namespace versavis::client {
 
 namespace {
 
-constexpr std::uint64_t item_size = 128;  ///< before its payload
-constexpr std::string_view item_encoding = "versavis_item";
-
 /// Chunks that at() keeps. Streams are written within some chunks of one another: with fewer, a
 /// recording with many cameras may be read twice.
 constexpr std::size_t kept_chunks = 8;
-
-enum class Role { other, item, image, compressed, gap };
-
-/// What the messages of a channel are.
-struct Part {
-    Role role = Role::other;
-    std::string stream;
-    ring::StreamKind kind{};
-};
-
-std::optional<ring::StreamKind> kind_of(const std::string& text) {
-    if (text.size() != 1 || text[0] < '1' || text[0] > '6') return std::nullopt;
-    return static_cast<ring::StreamKind>(text[0] - '0');
-}
-
-/// Between `begin` and `end` of a topic; empty: it is another.
-std::string inside(const std::string& topic, std::string_view begin, std::string_view end) {
-    if (topic.size() <= begin.size() + end.size() || !topic.starts_with(begin) ||
-        !topic.ends_with(end))
-        return {};
-    const auto name = topic.substr(begin.size(), topic.size() - begin.size() - end.size());
-    return is_stream_name(name) ? name : std::string();
-}
-
-Part part_of(const McapChannel& channel) {
-    if (auto name = inside(channel.topic, "/versavis/", "/item");
-        !name.empty() && channel.encoding == item_encoding) {
-        const auto found = channel.metadata.find("kind");
-        const auto kind = found == channel.metadata.end() ? std::nullopt : kind_of(found->second);
-        if (kind) return {Role::item, name, *kind};
-    }
-    if (auto name = inside(channel.topic, "/versavis/", "/gap");
-        !name.empty() && channel.encoding == "json")
-        return {Role::gap, name, {}};
-    if (channel.encoding != "cdr") return {};
-    if (auto name = inside(channel.topic, "/", "/image_raw/compressed"); !name.empty())
-        return {Role::compressed, name, {}};
-    if (auto name = inside(channel.topic, "/", "/image_raw"); !name.empty())
-        return {Role::image, name, {}};
-    return {};
-}
-
-struct Envelope {
-    std::uint64_t number;
-    std::uint64_t life;
-    OutputTime time;
-    std::uint32_t length;
-    ring::Metadata metadata;
-};
-
-std::optional<Envelope> parse_envelope(std::span<const std::byte> data) {
-    ByteCursor cursor(data);
-    Envelope envelope{};
-    envelope.number = cursor.number<std::uint64_t>();
-    envelope.life = cursor.number<std::uint64_t>();
-    envelope.time = {cursor.number<std::int64_t>()};
-    envelope.length = cursor.number<std::uint32_t>();
-    cursor.number<std::uint32_t>();
-    for (auto& word : envelope.metadata) word = cursor.number<std::uint64_t>();
-    if (!cursor.good()) return std::nullopt;
-    return envelope;
-}
-
-/// Of a frame; files before version 1.2 have none.
-std::uint64_t attributes_of(std::span<const std::byte> item) {
-    if (item.size() < item_size + sizeof(std::uint64_t)) return ring::no_attributes;
-    return ByteCursor(item.subspan(item_size)).number<std::uint64_t>();
-}
 
 /// The image that was met last, of one camera.
 struct Image {
@@ -105,7 +33,7 @@ struct Image {
 
 /// What one way through chunks knows; channels may be announced on the way.
 struct Walk {
-    std::map<std::uint16_t, Part> parts;
+    std::map<std::uint16_t, ChannelRole> parts;
     std::set<std::string, std::less<>> wanted;  ///< empty: all
     std::map<std::string, Image, std::less<>> images;
     std::vector<std::byte> pixels;
@@ -135,6 +63,24 @@ std::string metadata_value(const RecordingFacts& facts, const std::string& key) 
     return found == facts.metadata.end() ? std::string() : found->second;
 }
 
+/// The numbers of files that are named as later ones of a recording.
+std::set<std::uint32_t> later_parts(const std::filesystem::path& first) {
+    std::set<std::uint32_t> parts;
+    const std::string begin = first.stem().string() + "-";
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(
+             first.parent_path().empty() ? "." : first.parent_path(), error)) {
+        const std::string stem = entry.path().stem().string();
+        if (entry.path().extension() != first.extension() || !stem.starts_with(begin)) continue;
+        const std::string number = stem.substr(begin.size());
+        const bool digits = number.find_first_not_of("0123456789") == std::string::npos;
+        if (number.size() < 4 || number.size() > 6 || !digits) continue;
+        parts.insert(static_cast<std::uint32_t>(std::stoul(number)));
+    }
+    parts.erase(0);
+    return parts;
+}
+
 }  // namespace
 
 struct Recording::File {
@@ -145,28 +91,35 @@ struct Recording::File {
     };
 
     McapReader reader;
-    std::map<std::uint16_t, Part> parts;
+    std::map<std::uint16_t, ChannelRole> parts;
     std::vector<RecordedStream> streams;
     std::vector<Attachment> attachments;
     RecordingFacts facts;
-    std::list<Kept> kept;     ///< the one used last in front
-    Walk places;              ///< of at()
-    std::uint32_t index = 0;  ///< among the recording's files
+    std::list<Kept> kept;                                  ///< the one used last in front
+    Walk places;                                           ///< of at()
+    std::uint32_t index = 0;                               ///< among the recording's files
+    mutable std::map<std::uint64_t, std::string> damages;  ///< by their places
+    mutable std::set<std::uint32_t> damaged_chunks;
 
     explicit File(McapReader opened) : reader(std::move(opened)) {}
 
     Expected<> take_stock();
-    Expected<> count_items();
-    void count(const Part& part, std::uint64_t items);
+    void count_items();
+    void count(const ChannelRole& part, std::uint64_t items);
     Walk walk(const std::vector<std::string>& wanted) const;
     Expected<bool> visit(Walk& walk, std::uint32_t chunk, const McapRecord& record,
                          const Take& take, bool with_pixels) const;
-    Expected<bool> take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+    Expected<bool> take_item(Walk& walk, const ChannelRole& part, std::uint32_t chunk,
                              const McapRecord& record, const Take& take, bool with_pixels) const;
-    Expected<bool> for_each(const std::vector<std::string>& wanted, const Take& take,
-                            bool with_pixels) const;
+    bool for_each(const std::vector<std::string>& wanted, const Take& take, bool with_pixels) const;
+    void each_record(std::uint32_t chunk, bool with_pixels, const McapReader::Visit& visit) const;
+    void note(std::uint64_t offset, const Error& damage) const;
+    void check() const;
     Expected<std::span<const std::byte>> keep(std::uint32_t chunk);
-    Expected<> add_gaps(std::vector<RecordedGap>& gaps) const;
+    void add_gaps(std::vector<RecordedGap>& gaps) const;
+
+ private:
+    mutable McapBuffer buffer_;
 };
 
 Recording::Recording() = default;
@@ -193,12 +146,14 @@ Expected<Recording> Recording::open_file(const std::string& path) {
 /// NAME.mcap is followed by NAME-0001.mcap and so on, of the same run of the same instance.
 void Recording::follow(const std::string& path) {
     const std::filesystem::path first(path);
-    for (std::uint32_t part = 1;; ++part) {
+    const auto named = [&](std::uint32_t part) {
         auto next = first;
-        next.replace_filename(
+        return next.replace_filename(
             fmt::format("{}-{:04}{}", first.stem().string(), part, first.extension().string()));
-        std::error_code error;
-        if (!std::filesystem::exists(next, error)) return;
+    };
+    std::uint32_t last = 0;
+    for (const std::uint32_t part : later_parts(first)) {
+        const auto next = named(part);
         auto opened = open_file(next.string());
         const bool belongs =
             opened && metadata_value(opened->facts_, "part") == std::to_string(part) &&
@@ -209,8 +164,12 @@ void Recording::follow(const std::string& path) {
             const std::string why = opened ? "it is of another recording" : opened.error().what;
             facts_.defect += fmt::format("{}{} is not used: {}", facts_.defect.empty() ? "" : "; ",
                                          next.filename().string(), why);
-            return;
+            continue;
         }
+        for (std::uint32_t missing = last + 1; missing < part; ++missing)
+            if (std::error_code error; !std::filesystem::exists(named(missing), error))
+                facts_.missing.push_back(named(missing).filename().string());
+        last = part;
         add(std::move(opened->files_.front()));
     }
 }
@@ -253,7 +212,7 @@ const Attachment* Recording::attachment(const std::string& name) const {
     return found == all.end() ? nullptr : &*found;
 }
 
-void Recording::File::count(const Part& part, std::uint64_t items) {
+void Recording::File::count(const ChannelRole& part, std::uint64_t items) {
     if (part.role != Role::item) return;
     const auto found = std::find_if(streams.begin(), streams.end(),
                                     [&](const auto& one) { return one.name == part.stream; });
@@ -264,6 +223,7 @@ void Recording::File::count(const Part& part, std::uint64_t items) {
 }
 
 Expected<> Recording::File::take_stock() {
+    for (const McapDamage& one : reader.damages()) damages[one.offset] = one.what;
     for (const auto& one : reader.attachments())
         attachments.push_back({one.name, one.media_type, one.content});
     facts = {1,
@@ -280,19 +240,21 @@ Expected<> Recording::File::take_stock() {
             ours = true;
         }
     for (const auto& channel : reader.channels())
-        parts.insert_or_assign(channel.id, part_of(channel));
+        parts.insert_or_assign(channel.id, role_of(channel));
     if (reader.defect().empty() && reader.statistics() && !reader.channels().empty()) {
         for (const auto& [channel, part] : parts) {
             const auto found = reader.statistics()->of_channel.find(channel);
             count(part, found == reader.statistics()->of_channel.end() ? 0 : found->second);
         }
-    } else if (auto counted = count_items(); !counted) {
-        return counted;
+    } else {
+        count_items();
     }
     places = walk({});
     if (streams.empty() && !ours)
         return failure(reader.path(),
-                       reader.chunks().empty() && !reader.defect().empty()
+                       !damages.empty()
+                           ? "holds no item that can be read: " + damages.begin()->second
+                       : reader.chunks().empty() && !reader.defect().empty()
                            ? "holds no complete chunk: " + reader.defect()
                            : "is not a VersaVIS recording: it has none of its items",
                        "name a file that 'versavis record' wrote");
@@ -300,20 +262,17 @@ Expected<> Recording::File::take_stock() {
 }
 
 /// Of a file that was cut off: channels are announced on the way.
-Expected<> Recording::File::count_items() {
+void Recording::File::count_items() {
     Walk all = walk({});
     const Take take = [&](const RecordedItem& item) {
         count({Role::item, item.stream, item.kind}, 1);
         return true;
     };
-    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk) {
-        auto glanced = reader.glance(reader.chunks()[chunk], [&](const McapRecord& record) {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, false, [&](const McapRecord& record) {
             return visit(all, chunk, record, take, false);
         });
-        if (!glanced) return glanced;
-    }
     parts = std::move(all.parts);
-    return {};
 }
 
 Walk Recording::File::walk(const std::vector<std::string>& wanted) const {
@@ -328,7 +287,7 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     if (record.opcode == McapOpcode::channel) {
         const auto channel = parse_channel(record.content);
         if (!channel) return reader.damaged(record.offset, "a channel is not whole");
-        walk.parts.insert_or_assign(channel->id, part_of(*channel));
+        walk.parts.insert_or_assign(channel->id, role_of(*channel));
         return true;
     }
     if (record.opcode != McapOpcode::message) return true;
@@ -336,7 +295,7 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     if (!message) return reader.damaged(record.offset, "a message is too short");
     const auto found = walk.parts.find(message->channel);
     if (found == walk.parts.end()) return true;
-    const Part& part = found->second;
+    const ChannelRole& part = found->second;
     if (part.role == Role::item && walk.wants(part.stream))
         return take_item(walk, part, chunk, record, take, with_pixels);
     if (part.role == Role::image || part.role == Role::compressed) {
@@ -350,42 +309,48 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     return true;
 }
 
-Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+Expected<bool> Recording::File::take_item(Walk& walk, const ChannelRole& part, std::uint32_t chunk,
                                           const McapRecord& record, const Take& take,
                                           bool with_pixels) const {
     const auto message = parse_message(record.content);
-    const auto envelope = parse_envelope(message->data);
-    if (!envelope) return reader.damaged(record.offset, "an item is too short");
-    if (!is_plausible(envelope->time.ns))
+    std::uint64_t payload_size = 0;
+    const auto parsed =
+        part.old ? parse_old_item(message->data, record.length - mcap_message_header, payload_size)
+                 : parse_item_message(message->data, payload_size);
+    if (!parsed) return reader.damaged(record.offset, "an item is too short");
+    if (!is_plausible(parsed->time.ns))
         return reader.damaged(record.offset, "the stamp of an item is no time");
     const auto place =
         static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
     RecordedItem item{part.stream,
                       part.kind,
-                      envelope->number,
-                      envelope->life,
-                      envelope->time,
-                      envelope->metadata,
+                      parsed->number,
+                      parsed->life,
+                      parsed->time,
+                      parsed->metadata,
                       {},
-                      envelope->length,
+                      parsed->length,
                       ring::no_attributes,
                       {index, chunk, place},
                       {}};
     if (part.kind != ring::StreamKind::frames) {
-        const std::uint64_t size = record.length - mcap_message_header - item_size;
-        if (size != envelope->length)
+        if (payload_size != parsed->length)
             return reader.damaged(record.offset, "an item's length differs from the one it states");
         std::vector<std::byte> rest;
-        item.payload = message->data.subspan(item_size);
-        if (item.payload.size() < size) {  // it was only glanced at
-            rest.resize(size);
-            if (auto got = reader.read(record.end() - size, rest); !got)
+        item.payload = parsed->payload;
+        if (item.payload.size() < payload_size) {  // it was only glanced at
+            if (payload_size > record.length)
+                return reader.damaged(record.offset, "an item is longer than its message");
+            rest.resize(payload_size);
+            if (auto got = reader.read(record.end() - payload_size, rest); !got)
                 return Unexpected(got.error());
             item.payload = rest;
         }
         return take(item);
     }
-    item.attributes = attributes_of(message->data);
+    ItemMessage frame = *parsed;
+    frame.kind = part.kind;
+    item.attributes = frame.attributes();
     const auto image = walk.images.find(part.stream);
     if (image != walk.images.end() && image->second.sequence == message->sequence) {
         item.place.image = image->second.place;
@@ -395,28 +360,48 @@ Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uin
     return take(item);
 }
 
-Expected<bool> Recording::File::for_each(const std::vector<std::string>& wanted, const Take& take,
-                                         bool with_pixels) const {
+void Recording::File::note(std::uint64_t offset, const Error& damage) const {
+    damages.try_emplace(offset, damage.what);
+}
+
+/// A chunk that is damaged is left out, and so is a record that `visit` cannot use.
+void Recording::File::each_record(std::uint32_t chunk, bool with_pixels,
+                                  const McapReader::Visit& visit) const {
+    const McapChunk& place = reader.chunks()[chunk];
+    if (damaged_chunks.count(chunk) != 0) return;
+    const McapReader::Visit each = [&](const McapRecord& record) -> Expected<bool> {
+        auto taken = visit(record);
+        if (taken) return taken;
+        note(record.offset, taken.error());
+        return true;
+    };
+    Expected<> read;
+    if (!with_pixels) {
+        read = reader.glance(place, each);
+    } else {
+        const auto records = reader.load(place, buffer_);
+        if (!records) damaged_chunks.insert(chunk);
+        read = records ? reader.for_each(place, *records, each) : Unexpected(records.error());
+    }
+    if (!read) note(place.offset, read.error());
+}
+
+void Recording::File::check() const {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, true, [](const McapRecord&) -> Expected<bool> { return true; });
+}
+
+bool Recording::File::for_each(const std::vector<std::string>& wanted, const Take& take,
+                               bool with_pixels) const {
     Walk way = walk(wanted);
-    McapBuffer buffer;
     bool more = true;
-    const auto& chunks = reader.chunks();
-    for (std::uint32_t chunk = 0; more && chunk < chunks.size(); ++chunk) {
+    for (std::uint32_t chunk = 0; more && chunk < reader.chunks().size(); ++chunk) {
         way.images.clear();
-        const McapReader::Visit each = [&](const McapRecord& record) -> Expected<bool> {
+        each_record(chunk, with_pixels, [&](const McapRecord& record) -> Expected<bool> {
             auto taken = visit(way, chunk, record, take, with_pixels);
-            more = taken && *taken;
+            if (taken) more = *taken;
             return taken;
-        };
-        if (!with_pixels) {
-            if (auto read = reader.glance(chunks[chunk], each); !read)
-                return Unexpected(read.error());
-            continue;
-        }
-        const auto records = reader.load(chunks[chunk], buffer);
-        if (!records) return Unexpected(records.error());
-        if (auto read = reader.for_each(chunks[chunk], *records, each); !read)
-            return Unexpected(read.error());
+        });
     }
     return more;
 }
@@ -431,11 +416,8 @@ Expected<> Recording::glance(const std::vector<std::string>& streams, const Take
 
 Expected<> Recording::in_each_file(const std::vector<std::string>& streams, const Take& take,
                                    bool with_pixels) const {
-    for (const auto& file : files_) {
-        const auto more = file->for_each(streams, take, with_pixels);
-        if (!more) return Unexpected(more.error());
-        if (!*more) return {};
-    }
+    for (const auto& file : files_)
+        if (!file->for_each(streams, take, with_pixels)) break;
     return {};
 }
 
@@ -481,38 +463,46 @@ Expected<> Recording::at(const ItemPlace& place, const Take& take) const {
     return {};
 }
 
-Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
-    for (const McapChunk& chunk : reader.chunks()) {
-        auto read = reader.glance(chunk, [&](const McapRecord& record) -> Expected<bool> {
+void Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk)
+        each_record(chunk, false, [&](const McapRecord& record) -> Expected<bool> {
             const auto message =
                 record.opcode == McapOpcode::message ? parse_message(record.content) : std::nullopt;
             if (!message) return true;
             const auto part = parts.find(message->channel);
             if (part == parts.end() || part->second.role != Role::gap) return true;
-            const auto json = parse_shallow_json(
-                {reinterpret_cast<const char*>(message->data.data()), message->data.size()});
-            if (!json.is_object()) return reader.damaged(record.offset, "a gap is no JSON object");
-            const auto reason = json.find("reason");
-            const auto items = json.find("items");
+            const auto gap =
+                part->second.old ? parse_old_gap(message->data) : parse_gap_message(message->data);
+            if (!gap) return reader.damaged(record.offset, "a gap is damaged");
             gaps.push_back({part->second.stream,
-                            reason != json.end() && reason->is_string() ? reason->get<std::string>()
-                                                                        : "unknown",
-                            items != json.end() && items->is_number_unsigned()
-                                ? items->get<std::uint64_t>()
-                                : 0,
+                            gap->reason,
+                            gap->items,
                             {static_cast<std::int64_t>(message->log_time)}});
             return true;
         });
-        if (!read) return read;
-    }
-    return {};
 }
 
 Expected<std::vector<RecordedGap>> Recording::gaps() const {
     std::vector<RecordedGap> gaps;
-    for (const auto& file : files_)
-        if (auto added = file->add_gaps(gaps); !added) return Unexpected(added.error());
+    for (const auto& file : files_) file->add_gaps(gaps);
     return gaps;
+}
+
+void Recording::check() const {
+    for (const auto& file : files_) file->check();
+}
+
+std::vector<std::string> Recording::damages() const {
+    std::vector<std::string> all;
+    for (const auto& file : files_)
+        for (const auto& [offset, what] : file->damages)
+            all.push_back(
+                files_.size() == 1
+                    ? what
+                    : fmt::format("{}: {}",
+                                  std::filesystem::path(file->reader.path()).filename().string(),
+                                  what));
+    return all;
 }
 
 }  // namespace versavis::client

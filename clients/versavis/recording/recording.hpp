@@ -72,6 +72,7 @@ struct RecordingFacts {
     std::uint64_t chunks;
     std::string library;                          ///< that wrote it
     std::map<std::string, std::string> metadata;  ///< the Metadata record `versavis`
+    std::vector<std::string> missing{};           ///< files of it that are not there
 };
 
 class Recording {
@@ -97,8 +98,7 @@ class Recording {
     using Take = std::function<bool(const RecordedItem&)>;
 
     /// Calls `take` with each item of the streams named (none named: of all), in the order of the
-    /// file, until it returns false. Errors: a damaged chunk, with its place; what came before has
-    /// been taken.
+    /// file, until it returns false. What is damaged is left out, and is in damages().
     Expected<> for_each(const std::vector<std::string>& streams, const Take& take) const;
 
     /// The same without the pixels of frames, which are not even read; checksums are not checked.
@@ -109,6 +109,12 @@ class Recording {
     Expected<> at(const ItemPlace& place, const Take& take) const;
 
     Expected<std::vector<RecordedGap>> gaps() const;
+
+    /// Reads all chunks once. What is damaged is left out from then on.
+    void check() const;
+
+    /// What was damaged so far, each with its place: it was passed over.
+    std::vector<std::string> damages() const;
 
  private:
     struct File;

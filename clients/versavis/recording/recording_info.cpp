@@ -161,11 +161,14 @@ Expected<json> recording_info(const std::string& path, const Recording& recordin
     const auto gaps = recording.gaps();
     if (!gaps) return Unexpected(gaps.error());
     const RecordingFacts& facts = recording.facts();
+    const std::vector<std::string> damages = recording.damages();
     json info{{"file", path},
               {"files", facts.files},
               {"bytes", facts.bytes},
-              {"whole", facts.defect.empty()},
+              {"whole", facts.defect.empty() && facts.missing.empty() && damages.empty()},
               {"defect", facts.defect},
+              {"missing", facts.missing},
+              {"damages", damages},
               {"good_bytes", facts.good_end},
               {"chunks", facts.chunks},
               {"output_clock", metadata_value(facts.metadata, "output_clock")},
@@ -194,7 +197,11 @@ std::string info_text(const json& info) {
         info["instance"].get<std::string>(), info["part"].get<std::string>());
     if (const auto files = info["files"].get<std::uint64_t>(); files > 1)
         text += fmt::format("  {} files\n", files);
-    if (!info["whole"].get<bool>())
+    for (const auto& one : info["missing"])
+        text += fmt::format("  missing: {}\n", one.get<std::string>());
+    for (const auto& one : info["damages"])
+        text += fmt::format("  left out: {}\n", one.get<std::string>());
+    if (!info["defect"].get<std::string>().empty())
         text += fmt::format(
             "  incomplete: {}; {} of {} bytes can be read; 'versavis repair' completes it\n",
             info["defect"].get<std::string>(), info["good_bytes"].get<std::uint64_t>(),

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <system_error>
@@ -16,7 +18,9 @@
 #include "base/byte_cursor.hpp"
 #include "posix/file.hpp"
 #include "recording/mcap_reader.hpp"
+#include "recording/mcap_record.hpp"
 #include "recording/mcap_summary.hpp"
+#include "recording/salvage.hpp"
 
 namespace versavis::client {
 
@@ -87,7 +91,9 @@ class Stock {
         SummaryChunk one{};
         one.offset = chunk.offset;
         one.length = chunk.end() - chunk.offset;
-        one.records_size = chunk.records_size;
+        one.records_size = chunk.unpacked;
+        one.packed_size = chunk.records_size;
+        one.compression = chunk.compression;
         auto read = reader_.for_each(chunk, *records, [&](const McapRecord& record) {
             return take_record(chunk, record, one);
         });
@@ -195,9 +201,8 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
     return file;
 }
 
-Error with_cure(Error damage) {
-    damage.cure = "'versavis repair --cut' ends it before that, and keeps the rest in FILE.cut";
-    return damage;
+Error not_moved(const std::string& path) {
+    return {path, "cannot be renamed: " + reason_of(errno), "check the permissions of its folder"};
 }
 
 Expected<> append_end(const FileDescriptor& file, const std::string& path, const Stock& stock) {
@@ -234,6 +239,39 @@ Expected<> repair_into(const std::string& output, const McapReader& reader, cons
     return written;
 }
 
+/// Of a file with a summary: whether it can be read without that, from record to record.
+bool is_one_chain(const McapReader& reader) {
+    bool ends = false;
+    const auto walked = reader.top_level([&](const McapRecord& record) -> Expected<bool> {
+        if (record.opcode != McapOpcode::footer) return true;
+        ends = record.end() + mcap_magic.size() == reader.size();
+        return false;
+    });
+    return walked && ends;
+}
+
+/// All that can be read, into a new file.
+Expected<RepairReport> save(const McapReader& reader, const std::string& output,
+                            RepairReport report) {
+    const std::string path = reader.path();
+    report.old_file = output.empty() ? path + ".damaged" : "";
+    std::error_code error;
+    if (output.empty() && std::filesystem::exists(report.old_file, error))
+        return not_written(report.old_file, EEXIST);
+    const std::string made = output.empty() ? path + ".repaired" : output;
+    auto saved = salvage(reader, made);
+    if (!saved) return Unexpected(saved.error());
+    report.was_whole = false;
+    report.chunks = saved->chunks;
+    report.messages = saved->messages;
+    report.left_out = std::move(saved->left_out);
+    if (report.defect.empty()) report.defect = "it is damaged";
+    if (!output.empty()) return report;
+    if (std::rename(path.c_str(), report.old_file.c_str()) != 0) return Unexpected(not_moved(path));
+    if (std::rename(made.c_str(), path.c_str()) != 0) return Unexpected(not_moved(made));
+    return report;
+}
+
 }  // namespace
 
 Expected<RepairReport> repair(const std::string& path, const std::string& output, bool cut) {
@@ -245,16 +283,18 @@ Expected<RepairReport> repair(const std::string& path, const std::string& output
     report.file = output.empty() ? path : output;
     report.defect = reader->defect();
     report.chunks = reader->chunks().size();
-    report.was_whole = report.defect.empty();
-    if (report.was_whole && !cut) {
-        report.file = path;
-        return report;
-    }
+    report.was_whole = report.defect.empty() && reader->damages().empty();
+    const bool in_place = reader->damages().empty() && reader->loose().empty() &&
+                          (!report.was_whole || is_one_chain(*reader));
+    if (!in_place && !cut) return save(*reader, output, std::move(report));
     std::optional<Stock> stock(std::in_place, *reader, reader->good_end());
     if (auto taken = stock->take(); !taken) {
-        const auto end = stock->damaged_at();
-        if (!end || !cut) return Unexpected(end ? with_cure(taken.error()) : taken.error());
-        report.defect += (report.was_whole ? "" : ", and ") + taken.error().what;
+        auto end = stock->damaged_at();
+        if (!cut) return save(*reader, output, std::move(report));
+        for (const McapDamage& one : reader->damages())
+            end = std::min(end.value_or(one.offset), one.offset);
+        if (!end) return Unexpected(taken.error());
+        report.defect += (report.defect.empty() ? "" : ", and ") + taken.error().what;
         report.was_whole = false;
         stock.emplace(*reader, *end);
         if (auto again = stock->take(); !again) return Unexpected(again.error());
@@ -278,12 +318,16 @@ std::string to_text(const RepairReport& report, bool json) {
         return nlohmann::json{{"file", report.file},         {"was_whole", report.was_whole},
                               {"defect", report.defect},     {"chunks", report.chunks},
                               {"messages", report.messages}, {"cut_bytes", report.cut_bytes},
-                              {"cut_file", report.cut_file}}
+                              {"cut_file", report.cut_file}, {"left_out", report.left_out},
+                              {"old_file", report.old_file}}
                    .dump() +
                "\n";
     if (report.was_whole) return fmt::format("{}: is complete, nothing was changed\n", report.file);
     std::string text = fmt::format("{}: {}; it is complete now, with {} messages in {} chunks\n",
                                    report.file, report.defect, report.messages, report.chunks);
+    for (const std::string& one : report.left_out) text += "left out: " + one + "\n";
+    if (!report.old_file.empty())
+        text += fmt::format("the file as it was is {}\n", report.old_file);
     if (!report.cut_file.empty())
         text +=
             fmt::format("the {} bytes after that are in {}\n", report.cut_bytes, report.cut_file);

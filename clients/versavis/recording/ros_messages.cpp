@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "recording/cdr_writer.hpp"
+#include "recording/item_messages.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {
@@ -18,7 +19,7 @@ constexpr std::string_view header = "std_msgs/Header";
 constexpr std::string_view vector3 = "geometry_msgs/Vector3";
 
 struct Definition {
-    std::string_view fields;
+    std::string fields;
     std::vector<std::string_view> parts;  ///< types that it is made of, all levels
 };
 
@@ -48,7 +49,12 @@ const std::map<std::string_view, Definition>& definitions() {
         {"sensor_msgs/msg/Temperature",
          {"std_msgs/Header header\nfloat64 temperature\nfloat64 variance\n", {header}}},
         {"sensor_msgs/msg/TimeReference",
-         {"std_msgs/Header header\nbuiltin_interfaces/Time time_ref\nstring source\n", {header}}}};
+         {"std_msgs/Header header\nbuiltin_interfaces/Time time_ref\nstring source\n", {header}}},
+        {text_type, {"string data\n", {}}},
+        {item_type, {versavis_fields(item_type), {}}},
+        {stamp_type, {versavis_fields(stamp_type), {header}}},
+        {event_type, {versavis_fields(event_type), {header}}},
+        {gap_type, {versavis_fields(gap_type), {header}}}};
     return all;
 }
 
@@ -172,6 +178,7 @@ std::string ros_definition(std::string_view type) {
     if (found == definitions().end()) return {};
     std::string text(found->second.fields);
     for (const std::string_view name : found->second.parts) text += part(name);
+    if (found->second.parts.empty()) return text;
     return text + part("builtin_interfaces/Time");
 }
 
