@@ -91,8 +91,7 @@ class UsbStream final : public ByteStream {
         libusb_transfer& transfer = *writing_.transfer;
         std::copy(bytes.begin(), bytes.end(), writing_.buffer.begin());
         transfer.length = static_cast<int>(bytes.size());
-        if (const int code = libusb_submit_transfer(&transfer); code != 0)
-            return not_written(code);
+        if (const int code = libusb_submit_transfer(&transfer); code != 0) return not_written(code);
         writing_.pending = true;
         // libusb ends it at its time-out: twice that is only waited for when nobody reads.
         written_.wait_for(lock, std::chrono::milliseconds(2 * usb_timeout_ms),

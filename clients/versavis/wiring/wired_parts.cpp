@@ -34,7 +34,8 @@ void choose_circuit(WiredCamera& camera, const std::string& preset, const std::s
         if (agrees(trigger_line, circuit.trigger.line, circuit) &&
             agrees(strobe_line, circuit.exposure.line, circuit)) {
             camera.circuit = &circuit;
-            fitting.push_back(fmt::format("'versavis wiring {}' ({})", circuit.name, circuit.title));
+            fitting.push_back(
+                fmt::format("'versavis wiring {}' ({})", circuit.name, circuit.title));
         }
         others.push_back(lines_of(circuit));
     }
