@@ -53,16 +53,11 @@ ClockWitness::ClockWitness(const ClockEvidence& evidence, const std::string& out
     std::map<std::uint32_t, Life> lives;
     for (const ClockExchange& each : evidence.exchanges)
         lives[each.nonce].exchanges.push_back(each);
-    for (const ClockMessage& each : evidence.messages) {
-        lives[each.nonce].messages.push_back(each);
-        departures_.push_back({each.departed, each.arrived});
-    }
+    for (const ClockMessage& each : evidence.messages) lives[each.nonce].messages.push_back(each);
     for (auto& [nonce, life] : lives)
         lives_.emplace_back(std::move(life.exchanges), std::move(life.messages));
     std::sort(outputs_.begin(), outputs_.end(), by_epoch_and_host<OutputReading>);
     std::sort(pulses_.begin(), pulses_.end(), by_epoch_and_host<NamedPulse>);
-    std::sort(departures_.begin(), departures_.end(),
-              [](const Departure& a, const Departure& b) { return a.departed < b.departed; });
     if (output_clock == "tai") output_minus_utc_s_ = tai_minus_utc_s();
 }
 
@@ -87,20 +82,6 @@ Duration ClockWitness::outside_bounds(BoardTime board, HostTime host) const {
     const ClockBounds* found = life(board, host);
     const auto interval = found == nullptr ? std::nullopt : found->at(board);
     return interval ? interval->outside(host) : Duration{};
-}
-
-bool ClockWitness::departed_between(BoardTime begin, BoardTime end, HostTime about) const {
-    constexpr Duration around = seconds(2);
-    bool any = false;
-    auto departure = std::lower_bound(
-        departures_.begin(), departures_.end(), begin - around,
-        [](const Departure& each, BoardTime from) { return each.departed < from; });
-    for (; departure != departures_.end() && departure->departed <= end; ++departure) {
-        if (absolute(departure->arrived - about) > around * 2) continue;  // of another boot
-        any = true;
-        if (departure->departed >= begin) return true;
-    }
-    return !any;
 }
 
 void ClockWitness::judge(const StampTimes& stamp, VerdictBuilder& verdict) const {

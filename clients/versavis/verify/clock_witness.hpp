@@ -41,17 +41,8 @@ class ClockWitness {
     Duration outside_bounds(BoardTime board, HostTime host) const;
 
     const std::vector<ClockBounds>& lives() const { return lives_; }
-    /// The board sent messages other than answers.
-    bool has_messages() const { return !departures_.empty(); }
-    /// A message left the board from `begin` to `end`, or none is recorded around them.
-    bool departed_between(BoardTime begin, BoardTime end, HostTime about) const;
 
  private:
-    struct Departure {
-        BoardTime departed;
-        HostTime arrived;
-    };
-
     void judge_host(const StampTimes& stamp, VerdictBuilder& verdict) const;
     void judge_output(const StampTimes& stamp, VerdictBuilder& verdict) const;
     std::optional<Duration> off_host_clock(const StampTimes& stamp) const;
@@ -60,7 +51,6 @@ class ClockWitness {
     std::vector<ClockBounds> lives_;
     std::vector<OutputReading> outputs_;  ///< by epoch, then by time
     std::vector<NamedPulse> pulses_;      ///< likewise
-    std::vector<Departure> departures_;   ///< by board time
     std::int64_t output_minus_utc_s_ = 0;
 };
 

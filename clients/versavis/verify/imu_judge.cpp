@@ -17,13 +17,6 @@ namespace {
 constexpr std::int64_t usual_amounts = 12;
 constexpr Duration least_jitter = microseconds(50);
 
-/// A sample is sent within so many periods.
-constexpr std::int64_t periods_to_departure = 3;
-
-/// A stream of which fewer samples are followed by a message is not sent with the time of
-/// departure.
-constexpr double followed_share = 0.9;
-
 struct Found {
     std::size_t sample;
     Finding finding;
@@ -39,7 +32,6 @@ class ImuJudge {
             judge_stretch(begin, i);
             begin = i;
         }
-        judge_departures();
         std::sort(found_.begin(), found_.end(),
                   [](const Found& a, const Found& b) { return a.sample < b.sample; });
     }
@@ -53,12 +45,10 @@ class ImuJudge {
     void judge_stretch(std::size_t begin, std::size_t end);
     void judge_numbers(const std::vector<std::size_t>& which);
     void judge_translation(const std::vector<std::size_t>& which);
-    void judge_departures();
 
     const ImuEvidence& imu_;
     const ClockWitness& clock_;
     std::vector<Found> found_;
-    Duration period_;
 };
 
 bool judged(const StampedSample& sample) { return (sample.flags & flag_suspect) == 0; }
@@ -92,10 +82,9 @@ void ImuJudge::judge_numbers(const std::vector<std::size_t>& which) {
     if (periods.empty()) return;
     const auto median = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
     std::nth_element(periods.begin(), median, periods.end());
-    period_ = *median;
     const auto off = off_line(points);
     const std::int64_t jitter =
-        std::min(period_.ns / 4, std::max(least_jitter.ns, usual_amounts * usual_amount(off)));
+        std::min(median->ns / 4, std::max(least_jitter.ns, usual_amounts * usual_amount(off)));
     for (std::size_t i = 0; i < which.size(); ++i)
         if (std::llabs(off[i]) > jitter)
             found_.push_back({which[i], Finding::sample_clock, {off[i]}});
@@ -112,21 +101,6 @@ void ImuJudge::judge_translation(const std::vector<std::size_t>& which) {
         if (std::llabs(off[i]) > allowed_error(imu_.samples[which[i]].sigma_ns).ns)
             found_.push_back({which[i], Finding::uneven, {off[i]}});
     }
-}
-
-void ImuJudge::judge_departures() {
-    if (!clock_.has_messages() || period_.ns <= 0) return;
-    std::vector<std::size_t> without;
-    for (std::size_t i = 0; i < imu_.samples.size(); ++i) {
-        const StampedSample& sample = imu_.samples[i];
-        if (judged(sample) &&
-            !clock_.departed_between(sample.board, sample.board + period_ * periods_to_departure,
-                                     sample.host))
-            without.push_back(i);
-    }
-    const auto all = static_cast<double>(imu_.samples.size());
-    if (static_cast<double>(without.size()) > (1 - followed_share) * all) return;
-    for (const std::size_t i : without) found_.push_back({i, Finding::no_departure, {}});
 }
 
 StreamVerdict ImuJudge::finish(HostTime begin) const {

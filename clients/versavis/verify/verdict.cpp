@@ -52,7 +52,6 @@ constexpr FindingText texts[] = {
     {Finding::repeated, Grade::untrusted, "repeated", "an item is there twice, or out of order"},
     {Finding::sample_clock, Grade::untrusted, "sample_clock",
      "its board time does not follow from its number and the samples beside it"},
-    {Finding::no_departure, Grade::untrusted, "no_departure", "no message left the board after it"},
     {Finding::message_stamp, Grade::untrusted, "message_stamp",
      "the stamp in the ROS message is not that of the item"},
     {Finding::pictures, Grade::untrusted, "pictures",

@@ -41,7 +41,6 @@ enum class Finding : std::uint8_t {
     missing,
     repeated,
     sample_clock,
-    no_departure,
     message_stamp,
     pictures,
     // plausible
