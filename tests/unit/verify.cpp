@@ -267,6 +267,11 @@ const WrongDrive wrong_drives[] = {
          each.time.ns += 300 * microsecond;
      },
      "imu0", Finding::sample_clock, 5, 5, 1, 1},
+    {"a ROS message has another stamp than its item",
+     [](Drive& drive) {
+         drive.evidence().message_stamps["cam1"][drive.frames(1)[70].time.ns] = {25};
+     },
+     "cam1", Finding::message_stamp, 3, 5, 1, 1},
     {"samples are spliced in from before",
      [](Drive& drive) {
          auto& samples = drive.samples();

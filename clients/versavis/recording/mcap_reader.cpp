@@ -669,7 +669,7 @@ Expected<std::span<const std::byte>> McapReader::load(const McapChunk& chunk,
     if (auto readable = check_readable(chunk); !readable) return Unexpected(readable.error());
     std::span<const std::byte> records;
     if (!chunk.compression.empty()) {
-        const auto unpacked = unpack(chunk, buffer);
+        auto unpacked = unpack(chunk, buffer);
         if (!unpacked) return unpacked;
         records = *unpacked;
     } else {

@@ -143,6 +143,12 @@ Expected<Recording> Recording::open_file(const std::string& path) {
     return recording;
 }
 
+std::vector<std::string> Recording::paths() const {
+    std::vector<std::string> paths;
+    for (const auto& file : files_) paths.push_back(file->reader.path());
+    return paths;
+}
+
 /// NAME.mcap is followed by NAME-0001.mcap and so on, of the same run of the same instance.
 void Recording::follow(const std::string& path) {
     const std::filesystem::path first(path);

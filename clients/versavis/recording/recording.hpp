@@ -92,6 +92,9 @@ class Recording {
     const std::vector<Attachment>& attachments() const;
     const RecordingFacts& facts() const;
 
+    /// Of its files, in their order.
+    std::vector<std::string> paths() const;
+
     /// Null: there is none of this name.
     const Attachment* attachment(const std::string& name) const;
 

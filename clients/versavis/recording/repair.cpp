@@ -253,7 +253,7 @@ bool is_one_chain(const McapReader& reader) {
 /// All that can be read, into a new file.
 Expected<RepairReport> save(const McapReader& reader, const std::string& output,
                             RepairReport report) {
-    const std::string path = reader.path();
+    const std::string& path = reader.path();
     report.old_file = output.empty() ? path + ".damaged" : "";
     std::error_code error;
     if (output.empty() && std::filesystem::exists(report.old_file, error))

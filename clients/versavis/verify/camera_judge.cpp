@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "verify/even_line.hpp"
-#include "verify/stream_order.hpp"
 
 namespace versavis::client {
 
@@ -95,7 +94,7 @@ class CameraJudge {
         judge_translation();
     }
 
-    StreamVerdict finish(HostTime begin) const;
+    StreamVerdict finish(StreamOrder order) const;
 
  private:
     void find_arrivals();
@@ -452,9 +451,8 @@ void CameraJudge::judge_translation() {
     judge();
 }
 
-StreamVerdict CameraJudge::finish(HostTime begin) const {
+StreamVerdict CameraJudge::finish(StreamOrder order) const {
     VerdictBuilder verdict(camera_.name, "camera");
-    StreamOrder order(camera_.gaps, begin);
     for (const Claim& claim : claims_) {
         const FrameMetadata& frame = claim.frame->frame;
         verdict.begin_item(order.second(frame.arrival), frame.sigma_ns);
@@ -477,8 +475,8 @@ StreamVerdict CameraJudge::finish(HostTime begin) const {
 }  // namespace
 
 StreamVerdict judge_camera(const CameraEvidence& camera, const ClockWitness& clock,
-                           HostTime begin) {
-    return CameraJudge(camera, clock).finish(begin);
+                           StreamOrder order) {
+    return CameraJudge(camera, clock).finish(std::move(order));
 }
 
 }  // namespace versavis::client

@@ -4,12 +4,14 @@
 
 #include "verify/clock_witness.hpp"
 #include "verify/recorded_evidence.hpp"
+#include "verify/stream_order.hpp"
 #include "verify/verdict.hpp"
 
 namespace versavis::client {
 
 /// By the board's records, the camera's clock and block ids, and the arrivals. The pairing is not
 /// repeated: each frame's claim is held against all that was recorded before and after it.
-StreamVerdict judge_camera(const CameraEvidence& camera, const ClockWitness& clock, HostTime begin);
+StreamVerdict judge_camera(const CameraEvidence& camera, const ClockWitness& clock,
+                           StreamOrder order);
 
 }  // namespace versavis::client

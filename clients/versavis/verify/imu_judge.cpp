@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "verify/even_line.hpp"
-#include "verify/stream_order.hpp"
 
 namespace versavis::client {
 
@@ -36,7 +35,7 @@ class ImuJudge {
                   [](const Found& a, const Found& b) { return a.sample < b.sample; });
     }
 
-    StreamVerdict finish(HostTime begin) const;
+    StreamVerdict finish(StreamOrder order) const;
 
  private:
     static bool goes_on(const StampedSample& last, const StampedSample& next) {
@@ -103,9 +102,8 @@ void ImuJudge::judge_translation(const std::vector<std::size_t>& which) {
     }
 }
 
-StreamVerdict ImuJudge::finish(HostTime begin) const {
+StreamVerdict ImuJudge::finish(StreamOrder order) const {
     VerdictBuilder verdict(imu_.name, "imu");
-    StreamOrder order(imu_.gaps, begin);
     auto found = found_.begin();
     for (std::size_t i = 0; i < imu_.samples.size(); ++i) {
         const StampedSample& sample = imu_.samples[i];
@@ -128,8 +126,8 @@ StreamVerdict ImuJudge::finish(HostTime begin) const {
 
 }  // namespace
 
-StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, HostTime begin) {
-    return ImuJudge(imu, clock).finish(begin);
+StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, StreamOrder order) {
+    return ImuJudge(imu, clock).finish(std::move(order));
 }
 
 }  // namespace versavis::client

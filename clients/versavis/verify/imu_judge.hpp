@@ -4,11 +4,12 @@
 
 #include "verify/clock_witness.hpp"
 #include "verify/recorded_evidence.hpp"
+#include "verify/stream_order.hpp"
 #include "verify/verdict.hpp"
 
 namespace versavis::client {
 
 /// By their numbers, the samples beside them, and the messages that brought them.
-StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, HostTime begin);
+StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, StreamOrder order);
 
 }  // namespace versavis::client

@@ -194,6 +194,9 @@ Expected<RecordedEvidence> read_evidence(const Recording& recording,
         for (ImuEvidence& imu : evidence.imus)
             if (imu.name == gap.stream) imu.gaps.push_back(gap);
     }
+    for (const std::string& path : recording.paths())
+        if (auto compared = compare_message_stamps(path, evidence.message_stamps); !compared)
+            return Unexpected(compared.error());
     const auto& metadata = recording.facts().metadata;
     if (const auto clock = metadata.find("output_clock"); clock != metadata.end())
         evidence.output_clock = clock->second;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "recording/recording.hpp"
+#include "verify/message_stamps.hpp"
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
 #include "versavis/time.hpp"
@@ -128,6 +129,7 @@ struct RecordedEvidence {
     ClockEvidence clock;
     std::vector<CameraEvidence> cameras;
     std::vector<ImuEvidence> imus;
+    MessageStamps message_stamps;
     std::string output_clock;  ///< as the service named it; empty: not known
 };
 

@@ -12,8 +12,9 @@ constexpr int many = 3;
 
 }  // namespace
 
-StreamOrder::StreamOrder(const std::vector<RecordedGap>& gaps, HostTime begin)
-    : gaps_(gaps), begin_(begin) {}
+StreamOrder::StreamOrder(const std::vector<RecordedGap>& gaps, HostTime begin,
+                         const std::map<std::int64_t, Duration>* messages)
+    : gaps_(gaps), begin_(begin), messages_(messages) {}
 
 std::int64_t StreamOrder::second(HostTime host) {
     const bool is_far = last_host_ && absolute(host - *last_host_) > far;
@@ -38,6 +39,9 @@ void StreamOrder::judge(const StampedItem& item, std::uint32_t epoch, VerdictBui
         if (epoch == last_epoch_ && item.time < last_->time)
             verdict.add(Finding::backwards, item.time - last_->time);
     }
+    if (messages_ != nullptr)
+        if (const auto off = messages_->find(item.time.ns); off != messages_->end())
+            verdict.add(Finding::message_stamp, off->second);
     last_ = item;
     last_epoch_ = epoch;
 }

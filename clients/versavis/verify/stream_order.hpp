@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -13,8 +14,10 @@ namespace versavis::client {
 
 class StreamOrder {
  public:
-    /// `gaps`: as the recorder noted them. `begin`: of the recording.
-    StreamOrder(const std::vector<RecordedGap>& gaps, HostTime begin);
+    /// `gaps`: as the recorder noted them. `begin`: of the recording. `messages`: stamps in
+    /// messages of ROS that differ, by the time of the item; null: none.
+    StreamOrder(const std::vector<RecordedGap>& gaps, HostTime begin,
+                const std::map<std::int64_t, Duration>* messages);
 
     /// The second of an item that says that it is of `host`. A time that is far off the one before
     /// does not count: the order of the file does, unless many in a row agree.
@@ -28,6 +31,7 @@ class StreamOrder {
 
     const std::vector<RecordedGap>& gaps_;
     HostTime begin_;
+    const std::map<std::int64_t, Duration>* messages_;
     std::optional<HostTime> last_host_;
     int far_off_ = 0;
     std::optional<StampedItem> last_;

@@ -8,6 +8,7 @@
 #include "verify/camera_judge.hpp"
 #include "verify/clock_witness.hpp"
 #include "verify/imu_judge.hpp"
+#include "verify/stream_order.hpp"
 
 namespace versavis::client {
 
@@ -36,12 +37,18 @@ Grade Verification::grade() const {
 Verification verify(const RecordedEvidence& evidence) {
     const ClockWitness clock(evidence.clock, evidence.output_clock);
     const HostTime begin = begin_of(evidence);
+    const auto order_of = [&](const std::string& name, const std::vector<RecordedGap>& gaps) {
+        const auto differing = evidence.message_stamps.find(name);
+        return StreamOrder(
+            gaps, begin, differing == evidence.message_stamps.end() ? nullptr : &differing->second);
+    };
     Verification verification;
     for (const CameraEvidence& camera : evidence.cameras)
         if (!camera.frames.empty() || camera.impossible > 0)
-            verification.streams.push_back(judge_camera(camera, clock, begin));
+            verification.streams.push_back(
+                judge_camera(camera, clock, order_of(camera.name, camera.gaps)));
     for (const ImuEvidence& imu : evidence.imus)
-        verification.streams.push_back(judge_imu(imu, clock, begin));
+        verification.streams.push_back(judge_imu(imu, clock, order_of(imu.name, imu.gaps)));
     std::vector<Duration> widths;
     for (const ClockBounds& life : clock.lives()) {
         ++verification.board_lives;
@@ -67,6 +74,9 @@ Expected<Verification> verify_recording(const std::string& path,
     if (!recording->facts().defect.empty())
         verification.notes.push_back("the end of the file is missing: " +
                                      recording->facts().defect);
+    for (const std::string& damage : recording->damages()) verification.notes.push_back(damage);
+    for (const std::string& missing : recording->facts().missing)
+        verification.notes.push_back("a file of the recording is missing: " + missing);
     if (verification.streams.empty())
         verification.notes.emplace_back("there are no frames and no samples in it");
     return verification;
