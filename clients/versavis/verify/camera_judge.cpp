@@ -476,7 +476,7 @@ StreamVerdict CameraJudge::finish(StreamOrder order) const {
 
 StreamVerdict judge_camera(const CameraEvidence& camera, const ClockWitness& clock,
                            StreamOrder order) {
-    return CameraJudge(camera, clock).finish(std::move(order));
+    return CameraJudge(camera, clock).finish(order);
 }
 
 }  // namespace versavis::client

@@ -127,7 +127,7 @@ StreamVerdict ImuJudge::finish(StreamOrder order) const {
 }  // namespace
 
 StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, StreamOrder order) {
-    return ImuJudge(imu, clock).finish(std::move(order));
+    return ImuJudge(imu, clock).finish(order);
 }
 
 }  // namespace versavis::client
