@@ -123,7 +123,7 @@ TEST_CASE("board: without a board, each command says what to do") {
     }
 }
 
-TEST_CASE("board: the service has it and says what it is; reset and self-test are refused") {
+TEST_CASE("usb: a board that the service has says what it is; it is not reset or tested") {
     BoardBench bench;
     Stack stack({"boardbusy", 33, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_rig();

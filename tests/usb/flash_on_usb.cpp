@@ -366,7 +366,7 @@ TEST_CASE("flash: interrupted, it says what state the board is in") {
     CHECK(holds(pico, new_version));
 }
 
-TEST_CASE("flash: a board that the service has is left alone") {
+TEST_CASE("usb: a board that the service has is not flashed") {
     FlashBench bench;
     Stack stack({"flashbusy", 32, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_rig();
