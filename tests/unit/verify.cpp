@@ -67,7 +67,6 @@ class Drive {
         CameraEvidence& camera = evidence_.cameras.emplace_back();
         camera.name = name;
         CameraRun& run = camera.runs.emplace_back();
-        run.from_beginning = true;
         run.period = {50 * millisecond};
         run.latest_arrival = {200 * millisecond};
         constexpr int pattern[] = {1, 2, 1, 1, 2, 2, 1, 2, 1, 1};
@@ -75,8 +74,7 @@ class Drive {
         for (std::uint64_t i = 0; start.ns < seconds_ * 1000 * millisecond; ++i) {
             const std::uint64_t trigger = 40 + i;
             const BoardTime end{start.ns + 5 * millisecond};
-            run.exposures.push_back(
-                {trigger, start, end, {30 * microsecond}, StampKind::measured_middle, true});
+            run.exposures.push_back({trigger, start, end, {30 * microsecond}, true});
             run.records.push_back({trigger, start + Duration{30 * microsecond},
                                    end + Duration{30 * microsecond}, true});
             const HostTime arrived =
@@ -330,7 +328,6 @@ TEST_CASE("verify: without a witness a stamp is plausible, not proved") {
     }
     SECTION("the start is not in the recording, and frames may come late") {
         auto& run = drive.camera(0).runs[0];
-        run.from_beginning = false;
         run.exposures.erase(run.exposures.begin(), run.exposures.begin() + 30);
         run.arrivals.erase(run.arrivals.begin(), run.arrivals.begin() + 30);
         drive.frames(0).erase(drive.frames(0).begin(), drive.frames(0).begin() + 40);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/median.hpp"
 #include "evaluate/allan_report.hpp"
 
 namespace versavis::client {
@@ -247,12 +248,6 @@ std::vector<float> evened(const std::vector<OutputTime>& times, const std::vecto
         even.push_back(rates[i]);
     }
     return even;
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 /// The usual time between samples: lost ones do not change it.

@@ -11,6 +11,8 @@
 #include <random>
 #include <vector>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -185,8 +187,7 @@ std::optional<FrameRotation> FeatureRotation::Tracker::rotation_to(
         }
         if (misses.size() < least_agreeing) return std::nullopt;
         // Half of the lengths of two normal components are below 1.18 sigmas.
-        std::nth_element(misses.begin(), misses.begin() + misses.size() / 2, misses.end());
-        scale = std::max(misses[misses.size() / 2] / 1.18 * 2, 1e-3 * pixel);
+        scale = std::max(median(misses) / 1.18 * 2, 1e-3 * pixel);
         rotation = best_rotation(before, now, weights);
     }
     FrameRotation result;

@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -221,8 +223,7 @@ double median_gap(const GreyPicture& picture, const LedPlace& place) {
                 mean(picture, between(place, (i + 0.5) / led_gaps), gap_radius * place.pitch()))
             levels.push_back(*level);
     if (levels.empty()) return 0;
-    std::nth_element(levels.begin(), levels.begin() + levels.size() / 2, levels.end());
-    return levels[levels.size() / 2];
+    return median(std::move(levels));
 }
 
 }  // namespace

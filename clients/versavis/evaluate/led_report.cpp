@@ -10,6 +10,8 @@
 #include <numeric>
 #include <optional>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -278,9 +280,7 @@ std::optional<double> period_s(const std::vector<LedObservation>& shots) {
         if (continuous(shots[i - 1], shots[i]))
             steps.push_back(s(shots[i].time - shots[i - 1].time));
     if (steps.empty()) return std::nullopt;
-    std::nth_element(steps.begin(), steps.begin() + static_cast<long>(steps.size() / 2),
-                     steps.end());
-    return steps[steps.size() / 2];
+    return median(std::move(steps));
 }
 
 /// A service that is wrong by whole pictures shows the same counts again after some of them.

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <optional>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -68,13 +70,6 @@ constexpr double most_weight = 4;
 
 double seconds_of(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
 double square(double x) { return x * x; }
-
-template <class T>
-T median(std::vector<T> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 struct Turn {
     double from;  ///< s since the first sample of the gyro

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/byte_cursor.hpp"
+#include "base/median.hpp"
 #include "base/shallow_json.hpp"
 #include "engine/rounding.hpp"
 #include "process/frame_proof.hpp"
@@ -287,9 +288,7 @@ class Processing {
                     by_other_clock(live_stamp(one), restamping_))
                     off.push_back(absolute(one.change.before - one.stamp->output));
         if (off.size() < least_of_other_clock) return {};
-        const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-        std::nth_element(off.begin(), middle, off.end());
-        return *middle;
+        return median(std::move(off));
     }
 
     static LiveStamp live_stamp(const Candidate& one) {

@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "base/median.hpp"
 #include "verify/even_line.hpp"
 
 namespace versavis::client {
@@ -231,11 +232,10 @@ void CameraJudge::judge_lengths(const std::vector<Claim*>& claims) const {
     for (const Claim* claim : claims)
         if (states(claim)) all.push_back(longer(claim));
     if (all.empty()) return;
-    const auto median = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), median, all.end());
+    const Duration usual = median(std::move(all));
     for (Claim* claim : claims) {
         if (!states(claim)) continue;
-        const Duration off = longer(claim) - *median;
+        const Duration off = longer(claim) - usual;
         if (absolute(off) > std::max(length_tolerance, claim->arrival->exposure / length_share))
             claim->add(Finding::stated_length, off);
     }
@@ -321,18 +321,14 @@ class ClockFollower {
             drifts.push_back(static_cast<double>(risen.ns) / apart);
         }
         if (drifts.empty()) return;
-        const auto median = drifts.begin() + static_cast<std::ptrdiff_t>(drifts.size() / 2);
-        std::nth_element(drifts.begin(), median, drifts.end());
-        drift_ = *median;
+        drift_ = median(std::move(drifts));
         drift_error_ = known_drift;
     }
 
     Duration usual_latency() const {
         std::vector<Duration> all;
         for (const Point& point : good_) all.push_back(point.latency);
-        const auto median = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-        std::nth_element(all.begin(), median, all.end());
-        return *median;
+        return median(std::move(all));
     }
 
     std::deque<Point> good_;

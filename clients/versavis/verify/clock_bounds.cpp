@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -132,9 +134,7 @@ double ClockBounds::slope_around(BoardTime at, const std::vector<Bound>& quickes
         }
     error = slopes.size() < 3 ? unknown_slope_error : slope_error;
     if (slopes.size() < 3) return 0;
-    const auto median = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
-    std::nth_element(slopes.begin(), median, slopes.end());
-    return *median;
+    return median(std::move(slopes));
 }
 
 void ClockBounds::make_block(std::int64_t number, const std::vector<Bound>& quickest) {
@@ -191,19 +191,12 @@ bool ClockBounds::contradictory(BoardTime board) const {
     return found != nullptr && !found->agree;
 }
 
-double ClockBounds::slope(BoardTime board) const {
-    const Block* found = block(board);
-    return found == nullptr ? 0 : found->slope;
-}
-
 Duration ClockBounds::usual_width() const {
     std::vector<Duration> widths;
     for (const auto& [number, each] : blocks_)
         if (each.agree) widths.push_back(each.highest - each.lowest);
     if (widths.empty()) return {};
-    const auto median = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-    std::nth_element(widths.begin(), median, widths.end());
-    return *median;
+    return median(std::move(widths));
 }
 
 }  // namespace versavis::client

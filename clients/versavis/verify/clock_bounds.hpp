@@ -36,9 +36,6 @@ class ClockBounds {
     /// They contradict each other around this instant.
     bool contradictory(BoardTime board) const;
 
-    /// ns by which the host gains on the board in one ns around this instant.
-    double slope(BoardTime board) const;
-
     /// From the first exchange sent to the last one that arrived.
     HostTime begin() const { return begin_; }
     HostTime end() const { return end_; }

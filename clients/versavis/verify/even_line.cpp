@@ -5,19 +5,14 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/median.hpp"
+
 namespace versavis::client {
 
 namespace {
 
 /// Points of one line. Fewer: outliers side by side are half of them; more: clocks are no lines.
 constexpr std::size_t group = 32;
-
-template <class Value>
-Value median_of(std::vector<Value>& values) {
-    const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), median, values.end());
-    return *median;
-}
 
 void group_off_line(const LinePoint* points, std::size_t count, std::int64_t* off) {
     // y alone: what is left of it when it grows as x does, so that a double holds it exactly.
@@ -34,10 +29,10 @@ void group_off_line(const LinePoint* points, std::size_t count, std::int64_t* of
             if (points[b].x != points[a].x)
                 values.push_back((risen(b) - risen(a)) / (along(b) - along(a)));
     if (values.empty()) return;
-    const double slope = median_of(values);
+    const double slope = median(values);
     values.clear();
     for (std::size_t i = 0; i < count; ++i) values.push_back(risen(i) - slope * along(i));
-    const double level = median_of(values);
+    const double level = median(std::move(values));
     for (std::size_t i = 0; i < count; ++i)
         off[i] = std::llround(risen(i) - slope * along(i) - level);
 }
@@ -62,7 +57,7 @@ std::vector<std::int64_t> off_line(const std::vector<LinePoint>& points) {
 std::int64_t usual_amount(std::vector<std::int64_t> values) {
     if (values.empty()) return 0;
     for (std::int64_t& value : values) value = std::llabs(value);
-    return median_of(values);
+    return median(std::move(values));
 }
 
 }  // namespace versavis::client

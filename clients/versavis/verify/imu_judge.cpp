@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/median.hpp"
 #include "verify/even_line.hpp"
 
 namespace versavis::client {
@@ -79,11 +80,10 @@ void ImuJudge::judge_numbers(const std::vector<std::size_t>& which) {
         points.push_back(point);
     }
     if (periods.empty()) return;
-    const auto median = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
-    std::nth_element(periods.begin(), median, periods.end());
+    const Duration period = median(std::move(periods));
     const auto off = off_line(points);
     const std::int64_t jitter =
-        std::min(median->ns / 4, std::max(least_jitter.ns, usual_amounts * usual_amount(off)));
+        std::min(period.ns / 4, std::max(least_jitter.ns, usual_amounts * usual_amount(off)));
     for (std::size_t i = 0; i < which.size(); ++i)
         if (std::llabs(off[i]) > jitter)
             found_.push_back({which[i], Finding::sample_clock, {off[i]}});

@@ -72,7 +72,6 @@ void add_camera_evidence(const ItemFields& item, CameraEvidence& camera) {
     switch (item.u32(0)) {
         case 1: {
             CameraRun& run = camera.runs.emplace_back();
-            run.from_beginning = true;
             run.period = {item.i64(8)};
             run.latest_arrival = {item.i64(24)};
             break;
@@ -82,7 +81,6 @@ void add_camera_evidence(const ItemFields& item, CameraEvidence& camera) {
                                         {item.i64(24)},
                                         {item.i64(32)},
                                         {item.i64(72)},
-                                        static_cast<StampKind>(item.u32(56)),
                                         item.at<std::uint8_t>(60) != 0};
             if (possible(each.start, each.end, each.delay))
                 newest_run(camera).exposures.push_back(each);

@@ -81,7 +81,6 @@ struct ExposureEvidence {
     BoardTime start;  ///< delays of the lines are subtracted from both
     BoardTime end;
     Duration delay;
-    StampKind kind;
     bool exposed;
 };
 
@@ -102,9 +101,8 @@ struct ArrivalEvidence {
 
 /// One stream of a camera, from its beginning to the next one.
 struct CameraRun {
-    bool from_beginning = false;  ///< its start is in the recording
-    Duration period;              ///< 0: not known
-    Duration latest_arrival;      ///< after the end of the exposure, as the service allows
+    Duration period;          ///< 0: not known
+    Duration latest_arrival;  ///< after the end of the exposure, as the service allows
     std::vector<ExposureEvidence> exposures;
     std::vector<ExposureRecord> records;
     std::vector<ArrivalEvidence> arrivals;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/median.hpp"
 #include "versavis/metadata.hpp"
 
 namespace versavis::client {
@@ -169,11 +170,7 @@ StreamVerdict VerdictBuilder::finish() {
             if (absolute(cell.worst) > absolute(span.worst)) span.worst = cell.worst;
         }
     }
-    if (!sigmas_.empty()) {
-        const auto median = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
-        std::nth_element(sigmas_.begin(), median, sigmas_.end());
-        verdict_.sigma = {static_cast<std::int64_t>(*median)};
-    }
+    if (!sigmas_.empty()) verdict_.sigma = {std::int64_t{median(std::move(sigmas_))}};
     return std::move(verdict_);
 }
 

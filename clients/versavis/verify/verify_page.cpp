@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/markup_text.hpp"
+
 #include "verify/verification.hpp"
 
 namespace versavis::client {
@@ -46,21 +48,6 @@ const char* style_of(Grade grade) {
     return "proved";
 }
 
-std::string escaped(const std::string& text) {
-    std::string safe;
-    for (const char c : text) {
-        if (c == '&')
-            safe += "&amp;";
-        else if (c == '<')
-            safe += "&lt;";
-        else if (c == '>')
-            safe += "&gt;";
-        else
-            safe += c;
-    }
-    return safe;
-}
-
 /// Where a second is on the time line.
 class TimeAxis {
  public:
@@ -93,7 +80,7 @@ class TimeAxis {
 /// Seconds in a row of one grade are one bar.
 std::string strip(const StreamVerdict& stream, const TimeAxis& axis, double y) {
     std::string svg = fmt::format(R"(<text x="{}" y="{}" text-anchor="end">{}</text>)",
-                                  chart_left - 8, y + strip_height - 5, escaped(stream.name));
+                                  chart_left - 8, y + strip_height - 5, markup_text(stream.name));
     auto from = stream.seconds.begin();
     while (from != stream.seconds.end()) {
         auto to = from;
@@ -103,10 +90,11 @@ std::string strip(const StreamVerdict& stream, const TimeAxis& axis, double y) {
             last = (to++)->first;
         const double left = axis.x(static_cast<double>(from->first));
         const double wide = axis.x(static_cast<double>(last + 1)) - left;
-        svg += fmt::format(R"(<rect class="{}" x="{:.1f}" y="{}" width="{:.2f}" height="{}">)"
-                           R"(<title>{}, seconds {} to {}: {}</title></rect>)",
-                           style_of(from->second.grade), left, y, std::max(wide, 1.0), strip_height,
-                           escaped(stream.name), from->first, last, to_string(from->second.grade));
+        svg +=
+            fmt::format(R"(<rect class="{}" x="{:.1f}" y="{}" width="{:.2f}" height="{}">)"
+                        R"(<title>{}, seconds {} to {}: {}</title></rect>)",
+                        style_of(from->second.grade), left, y, std::max(wide, 1.0), strip_height,
+                        markup_text(stream.name), from->first, last, to_string(from->second.grade));
         from = to;
     }
     return svg + "\n";
@@ -156,10 +144,10 @@ std::string bounds_plot(const StreamVerdict& stream, std::int64_t seconds) {
         return fmt::format(R"(<text x="{}" y="{:.1f}" text-anchor="end">{:+.0f} us</text>)",
                            chart_left - 8, y(ns) + 4, ns * 1e-3);
     };
-    return fmt::format("<h2>{}: host time against its bounds</h2>\n", escaped(stream.name)) +
+    return fmt::format("<h2>{}: host time against its bounds</h2>\n", markup_text(stream.name)) +
            fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="host time of {} against )"
                        R"(its bounds">)",
-                       chart_left + chart_width + 30, plot_height + 40, escaped(stream.name)) +
+                       chart_left + chart_width + 30, plot_height + 40, markup_text(stream.name)) +
            "\n" + band + stamps + label(most) + label(-most) + label(0) +
            axis.ticks(plot_height + 12) + "</svg>\n";
 }
@@ -170,7 +158,7 @@ std::string stream_table(const Verification& verification) {
         rows += fmt::format(
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
             "<td>{:.1f}</td></tr>\n",
-            escaped(stream.name), stream.items,
+            markup_text(stream.name), stream.items,
             stream.graded[static_cast<std::size_t>(Grade::proved)],
             stream.graded[static_cast<std::size_t>(Grade::plausible)],
             stream.graded[static_cast<std::size_t>(Grade::untrusted)], stream.withheld, stream.lost,
@@ -187,8 +175,8 @@ std::string finding_table(const Verification& verification) {
             rows += fmt::format(
                 "<tr><td>{}</td><td>{} to {}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
                 "</tr>\n",
-                escaped(stream.name), span.from_s, span.to_s, span.items,
-                to_string(grade_of(span.finding)), escaped(words_of(span.finding)),
+                markup_text(stream.name), span.from_s, span.to_s, span.items,
+                to_string(grade_of(span.finding)), markup_text(words_of(span.finding)),
                 span.worst.ns == 0
                     ? ""
                     : fmt::format("{:+.1f} us", static_cast<double>(span.worst.ns) * 1e-3));
@@ -202,9 +190,10 @@ std::string finding_table(const Verification& verification) {
 
 std::string to_html(const Verification& verification) {
     std::string page =
-        fmt::format(head, fmt::arg("title", escaped(verification.file) + ": verification"));
-    page += fmt::format("<h1>{}</h1>\n<p class=\"verdict {}\">{}</p>\n", escaped(verification.file),
-                        style_of(verification.grade()), escaped(verification.sentence()));
+        fmt::format(head, fmt::arg("title", markup_text(verification.file) + ": verification"));
+    page +=
+        fmt::format("<h1>{}</h1>\n<p class=\"verdict {}\">{}</p>\n", markup_text(verification.file),
+                    style_of(verification.grade()), markup_text(verification.sentence()));
     page += stream_table(verification);
     page += "<h2>Verdict by second</h2>\n<p class=\"key\">";
     for (const Grade grade : {Grade::proved, Grade::plausible, Grade::untrusted})
@@ -220,7 +209,7 @@ std::string to_html(const Verification& verification) {
         "boot{}; black: where they lie.</p>\n",
         verification.exchanges, verification.board_lives, verification.board_lives == 1 ? "" : "s");
     for (const std::string& note : verification.notes)
-        page += fmt::format("<p>{}</p>\n", escaped(note));
+        page += fmt::format("<p>{}</p>\n", markup_text(note));
     return page + "</body></html>\n";
 }
 

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "base/markup_text.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -33,26 +35,11 @@ std::string kind_of(const std::string& signal) {
     return begins("uart") || begins("i2c") || begins("spi") ? "bus" : "input";
 }
 
-std::string escaped(const std::string& text) {
-    std::string safe;
-    for (const char c : text) {
-        if (c == '&')
-            safe += "&amp;";
-        else if (c == '<')
-            safe += "&lt;";
-        else if (c == '>')
-            safe += "&gt;";
-        else
-            safe += c;
-    }
-    return safe;
-}
-
 std::string text(int x, int y, const std::string& what, const char* fill = "#000",
                  const char* anchor = "start", int size = 12) {
     const std::string sized = size == 12 ? "" : fmt::format(" font-size=\"{}\"", size);
     return fmt::format(R"(<text x="{}" y="{}" text-anchor="{}" fill="{}"{}>{}</text>)", x, y,
-                       anchor, fill, sized, escaped(what));
+                       anchor, fill, sized, markup_text(what));
 }
 
 std::string box(int left, int right, int top, int bottom, const char* fill) {
