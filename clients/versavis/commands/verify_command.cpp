@@ -38,21 +38,26 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
 
 bool VerifyCommand::chosen() const { return command_->parsed(); }
 
-/// 0: all is proved; 1: something is not to be trusted; 2: something is plausible only.
+/// 0: all is proved; 1: something is not to be trusted; 2: something is plausible only. A recording
+/// that cannot be read does not keep the others from being verified.
 int VerifyCommand::run() const {
     if (!html_.empty() && files_.size() > 1)
         return fail({"--html", "a report is about one recording", "name one recording"}, EX_USAGE);
     Grade worst = Grade::proved;
+    int unread = EX_OK;
     for (const std::string& file : files_) {
         const auto verification = verify_recording(file, [this] { return !stop_(); });
-        if (!verification) return fail(verification.error());
+        if (!verification) {
+            unread = fail(verification.error());
+            continue;
+        }
         fmt::print("{}", json_ ? to_json(*verification).dump() + "\n" : to_text(*verification));
         worst = std::min(worst, verification->grade());
         if (html_.empty()) continue;
         if (const auto written = write_whole_file(html_, to_html(*verification)); !written)
             return fail(written.error(), EX_CANTCREAT);
     }
-    return exit_code(worst);
+    return unread == EX_OK ? exit_code(worst) : unread;
 }
 
 }  // namespace versavis::client
