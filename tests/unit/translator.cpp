@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
 
 #include "simulated_clocks.hpp"
 
@@ -249,4 +250,71 @@ TEST_CASE("translator: a stored asymmetry is used until PPS measures another") {
     CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::pps);
     machine.translator.use_asymmetry(std::nullopt);
     CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::none);
+}
+
+namespace {
+
+/// A board whose clock is 5 s behind the host's, with exchanges ten times a second and two streams
+/// of 200 Hz, over a link whose delays spread by half a millisecond.
+struct Board {
+    Translator translator{*OutputClock::create(OutputClockKind::monotonic_raw)};
+    std::size_t streams[2]{translator.add_stream(), translator.add_stream()};
+    std::mt19937_64 random{1};
+    HostTime now{1'000'000'000'000};
+    Duration offset = -seconds(5);
+    Duration lie;      ///< by which exchanges are later than the truth
+    bool fits = true;  ///< messages follow those of their stream before them
+
+    BoardTime board(HostTime at) const { return {(at + offset).ns}; }
+    Duration delay() {
+        std::exponential_distribution<> spread(1 / 500e3);
+        return microseconds(80) + Duration{std::llround(spread(random))};
+    }
+    void exchange() {
+        for (int i = 0; i < 20; ++i) {
+            now = now + milliseconds(5);
+            for (const std::size_t stream : streams)
+                translator.heard(stream, {board(now), now + delay()}, fits);
+        }
+        const HostTime received = now + delay();
+        translator.add({now, board(received) + lie, board(received) + lie, received + delay()});
+    }
+    void exchange(int times) {
+        for (int i = 0; i < times; ++i) exchange();
+    }
+};
+
+}  // namespace
+
+TEST_CASE("translator: exchanges that the streams deny begin no estimate") {
+    Board it;
+    it.exchange(100);
+    const int exchanges_before = GENERATE(0, 1, 2, 5, 100);
+    if (exchanges_before < 100) it.translator.board_restarted();
+    it.exchange(exchanges_before);
+    it.lie = GENERATE(milliseconds(15), -milliseconds(15), seconds(3));
+    const std::uint32_t epoch = it.translator.report().epoch;
+    for (int i = 0; i < 40; ++i) {
+        it.exchange();
+        if (const auto stamp = it.translator.translate(it.board(it.now)))
+            CHECK(absolute(stamp->host - it.now).ns <= 4 * std::int64_t{stamp->sigma_ns});
+    }
+    it.lie = {};
+    it.exchange(100);
+    CHECK(it.translator.translate(it.board(it.now))->state == ClockState::locked);
+    CHECK(it.translator.report().epoch == epoch);
+}
+
+TEST_CASE("translator: a step of the board's clock is followed with the third exchange") {
+    Board it;
+    it.exchange(100);
+    const std::uint32_t epoch = it.translator.report().epoch;
+    it.offset = it.offset + GENERATE(milliseconds(15), -milliseconds(15), seconds(3));
+    it.fits = false;  // until they are adopted
+    it.exchange(3);
+    CHECK(it.translator.report().epoch == epoch + 1);
+    it.fits = true;
+    it.exchange(30);
+    CHECK(it.translator.report().epoch == epoch + 1);
+    CHECK(it.translator.translate(it.board(it.now))->state == ClockState::locked);
 }

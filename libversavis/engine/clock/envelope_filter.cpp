@@ -126,7 +126,7 @@ const char* to_string(ClockState state) {
     return "unknown";
 }
 
-void EnvelopeFilter::add(const Exchange& exchange) {
+void EnvelopeFilter::add(const Exchange& exchange, bool denied) {
     if (!sane(exchange.sent) || !sane(exchange.received) || !sane(exchange.answered) ||
         !sane(exchange.arrived))
         return;
@@ -140,6 +140,7 @@ void EnvelopeFilter::add(const Exchange& exchange) {
         ++comparisons_;
         last_comparison_ = exchange.arrived;
     }
+    if (denied && !confirmed_) return;
     if (!begun_) return begin(exchange, round_trip);
     const OffsetSample down = to_board(exchange.sent, exchange.received);
     const OffsetSample up = to_host(exchange.answered, exchange.arrived);
@@ -150,6 +151,10 @@ void EnvelopeFilter::add(const Exchange& exchange) {
         if (!confirmed_) return restart(exchange, round_trip);  // one of the two is wrong
         if (contradictions_ > 0 && !anew) return;
         ++contradictions_;
+        if (denied) {
+            unwitnessed_contradictions_ = 0;
+            return;
+        }
         const bool prevails = persistence_.contradict(least_contradictions_to_prevail);
         // An estimate that just began may itself be what is wrong.
         const bool witnessed = continued_ && slots_ >= slots_to_trust;

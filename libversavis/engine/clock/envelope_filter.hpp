@@ -36,8 +36,9 @@ struct EdgeSite {
 class EnvelopeFilter {
  public:
     /// In the order in which they became available. Before the first exchange one-way messages are
-    /// ignored, and so is an exchange whose round trip is not positive.
-    void add(const Exchange& exchange);
+    /// ignored, and so is an exchange whose round trip is not positive. `denied`: the board's other
+    /// messages show that its times are wrong, so nothing begins with it.
+    void add(const Exchange& exchange, bool denied = false);
     void add(const OneWay& message);
 
     /// Other messages contradict the exchanges by so much, from now on, or allow them to be off.

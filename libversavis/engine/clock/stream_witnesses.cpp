@@ -52,6 +52,11 @@ constexpr std::size_t intervals_to_be_late = 3;
 /// Streams that must agree that exchanges are wrong: one alone may be wrong itself.
 constexpr int streams_to_doubt = 2;
 
+/// The answer on its way to the host.
+OffsetSample up(const Exchange& exchange) {
+    return {exchange.answered, {exchange.arrived.ns - exchange.answered.ns}};
+}
+
 /// `passed` in creeping.
 Duration crept(Duration passed) {
     return std::clamp(passed, Duration{}, seconds(5)) / slowest_drift;
@@ -138,10 +143,29 @@ Duration StreamWitnesses::quickest_answer(std::size_t newest) const {
     return quickest;
 }
 
+bool StreamWitnesses::deny(const Exchange& exchange) const {
+    const Duration answer = aligned(up(exchange));
+    // The answer may have taken longer than the quickest do, but not for longer than the exchange.
+    const Duration slack =
+        (exchange.arrived - exchange.sent) - (exchange.answered - exchange.received);
+    bool denied = false;
+    for (std::size_t i = 0; i < streams_.size(); ++i) {
+        const Stream& stream = streams_[i];
+        const auto& quickest = stream.fitting.open.quickest;
+        if (!quickest || !stream.lead.known() || departure(i)) continue;
+        const Duration lead = aligned(*quickest) - answer;
+        const Duration least = stream.lead.departure(lead);
+        const Duration most = stream.lead.departure(lead + slack);
+        if (least <= Duration{} && most >= Duration{}) return false;
+        denied = true;
+    }
+    return denied;
+}
+
 void StreamWitnesses::exchanged(const Exchange& exchange, double skew) {
     skew_ = skew;
     now_ = exchange.answered;
-    answers_.push_front({exchange.answered, {exchange.arrived.ns - exchange.answered.ns}});
+    answers_.push_front(up(exchange));
     if (answers_.size() > answers_to_compare) answers_.pop_back();
     if (exchange.arrived - closed_ >= shortest_interval) close_interval(exchange.arrived);
 }

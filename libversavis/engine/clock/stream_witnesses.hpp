@@ -51,6 +51,11 @@ class StreamWitnesses {
     /// A message and whether it fits those of its stream before it.
     void heard(std::size_t stream, const OffsetSample& message, bool fits);
 
+    /// True: since the exchange before this one, messages fit those of their streams before them,
+    /// and none took as long as usual if the times of this exchange are right. The board's clock
+    /// cannot have stepped then, so they are wrong.
+    bool deny(const Exchange& exchange) const;
+
     /// `skew`: host clock against board clock, ns/s.
     void exchanged(const Exchange& exchange, double skew);
 

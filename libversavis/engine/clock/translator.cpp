@@ -71,7 +71,7 @@ void Translator::clock_continues() {
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
     const std::uint64_t restarts = filter_.restarts();
-    filter_.add(exchange);
+    filter_.add(exchange, witnesses_.deny(exchange));
     if (filter_.restarts() != restarts) witnesses_.clock_stepped();
     witnesses_.exchanged(exchange, filter_.skew());
     filter_.doubt(witnesses_.doubt(), witnesses_.allowance());
