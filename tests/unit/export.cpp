@@ -56,7 +56,7 @@ TEST_CASE("export: suspect frames, incomplete sets and repeated samples are left
     CHECK(sample.lines("left_out.csv") == 1 + report->selection.left_out.size());
     CHECK(sample.lines("mav0/times.txt") == report->selection.sets);
     CHECK(sample.lines("mav0/cam1/stamps.csv") == 1 + report->selection.sets);
-    CHECK(sample.lines("mav0/imu0.csv") == 1 + report->selection.samples.size());
+    CHECK(sample.lines("mav0/imu0.csv") == 1 + report->selection.imus[0].samples);
     CHECK(report->selection.imus[0].longest_gap == milliseconds(10));
 }
 
@@ -70,7 +70,7 @@ TEST_CASE("export: what was asked for is in") {
     REQUIRE(report);
     CHECK(left_out(*report, SkipReason::suspect) == 0);
     CHECK(left_out(*report, SkipReason::incomplete) == 0);
-    CHECK(report->selection.samples.size() == 170);
+    CHECK(report->selection.imus[0].samples == 170);
 }
 
 TEST_CASE("export: a directory that is not empty is left alone, an empty one is filled") {

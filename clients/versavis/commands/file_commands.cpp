@@ -83,9 +83,20 @@ void FileCommands::add_export(CLI::App& app) {
                      "(default: all, by name)")
         ->delimiter(',');
     export_->add_flag("--include-suspect", export_settings_.choice.include_suspect,
-                      "Include suspect frames and samples, and frames stamped by arrival");
+                      "Include frames and samples whatever their stamps are worth");
     export_->add_flag("--keep-repeated", export_settings_.choice.keep_repeated,
                       "Include IMU samples that repeat the previous one");
+    export_->add_flag("--join", export_settings_.choice.join,
+                      "Write one sequence, across restarts, epochs and holes of the IMU");
+    export_
+        ->add_option_function<double>(
+            "--max-sigma",
+            [this](double us) {
+                export_settings_.choice.max_sigma = Duration{static_cast<std::int64_t>(us * 1e3)};
+            },
+            "Leave out stamps of a larger sigma, us (default: 5000; any with --include-suspect)")
+        ->check(CLI::Range(0.0, 1e9))
+        ->type_name("US");
     export_
         ->add_option("--compression", export_settings_.compression, "Bag compression: none or lz4")
         ->transform(CLI::CheckedTransformer(compressions).description("{none,lz4}"))

@@ -19,13 +19,13 @@ struct Entry {
 };
 
 /// The recording is only nearly in this order; the places of all items are known by now.
-std::vector<Entry> in_order(const Selection& selection) {
+std::vector<Entry> in_order(const Selection& selection, const SelectedSequence& sequence) {
     std::vector<Entry> entries;
-    entries.reserve(selection.frames.size() + selection.samples.size());
+    entries.reserve(sequence.frames.size() + sequence.samples.size());
     const auto cameras = static_cast<std::uint32_t>(selection.cameras.size());
-    for (const auto& frame : selection.frames)
+    for (const auto& frame : sequence.frames)
         entries.push_back({frame.time, frame.place, frame.camera});
-    for (const auto& sample : selection.samples)
+    for (const auto& sample : sequence.samples)
         entries.push_back({sample.time, sample.place, cameras + sample.imu});
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return a.time < b.time; });
@@ -48,26 +48,27 @@ Expected<> write_frame(BagWriter& bag, const Entry& entry, std::uint32_t sequenc
 }  // namespace
 
 Expected<> export_bag(const Recording& recording, const Selection& selection,
-                      const std::vector<ExportFormat>& formats, const std::string& path,
-                      BagCompression compression, const ExportWatch& watch) {
+                      const SelectedSequence& sequence, const std::vector<ExportFormat>& formats,
+                      const std::string& path, BagCompression compression,
+                      const ExportWatch& watch) {
     auto bag = BagWriter::create(path, compression);
     if (!bag) return Unexpected(bag.error());
     for (const auto& camera : selection.cameras)
         bag->add_connection(image_topic(camera.name), ros1_image);
     for (const auto& imu : selection.imus) bag->add_connection(imu_topic(imu.name), ros1_imu);
-    std::vector<std::uint32_t> sequences(selection.cameras.size() + selection.imus.size(), 0);
-    const auto entries = in_order(selection);
+    std::vector<std::uint32_t> numbers(selection.cameras.size() + selection.imus.size(), 0);
+    const auto entries = in_order(selection, sequence);
     for (std::size_t done = 0; done < entries.size(); ++done) {
         if (watch.stopped()) return stopped_error();
         const Entry& entry = entries[done];
-        const std::uint32_t sequence = sequences[entry.stream]++;
+        const std::uint32_t number = numbers[entry.stream]++;
         Expected<> written;
         auto read = recording.at(entry.place, [&](const RecordedItem& item) {
             if (item.kind == ring::StreamKind::frames)
-                written = write_frame(*bag, entry, sequence, formats[entry.stream], item);
+                written = write_frame(*bag, entry, number, formats[entry.stream], item);
             else
                 written = bag->write(entry.stream, entry.time.ns,
-                                     ros1_imu_message({sequence, entry.time.ns, item.stream},
+                                     ros1_imu_message({number, entry.time.ns, item.stream},
                                                       unpack<ImuMetadata>(item.metadata)));
             return true;
         });

@@ -14,7 +14,8 @@ namespace versavis::client {
 /// `formats` are those of the selection's cameras. Errors: the file is damaged, the disk is full, a
 /// stamp that a bag cannot hold, stopped.
 Expected<> export_bag(const Recording& recording, const Selection& selection,
-                      const std::vector<ExportFormat>& formats, const std::string& path,
-                      BagCompression compression, const ExportWatch& watch);
+                      const SelectedSequence& sequence, const std::vector<ExportFormat>& formats,
+                      const std::string& path, BagCompression compression,
+                      const ExportWatch& watch);
 
 }  // namespace versavis::client

@@ -26,17 +26,17 @@ constexpr auto imu_columns =
 /// What is to be written next, in the order of the file.
 struct Job {
     ItemPlace place;
-    std::uint32_t index;  ///< of the selection's frame or sample
+    std::uint32_t index;  ///< of the sequence's frame or sample
     bool sample;
 };
 
-std::vector<Job> jobs_of(const Selection& selection) {
+std::vector<Job> jobs_of(const SelectedSequence& sequence) {
     std::vector<Job> jobs;
-    jobs.reserve(selection.frames.size() + selection.samples.size());
-    for (std::uint32_t i = 0; i < selection.frames.size(); ++i)
-        jobs.push_back({selection.frames[i].place, i, false});
-    for (std::uint32_t i = 0; i < selection.samples.size(); ++i)
-        jobs.push_back({selection.samples[i].place, i, true});
+    jobs.reserve(sequence.frames.size() + sequence.samples.size());
+    for (std::uint32_t i = 0; i < sequence.frames.size(); ++i)
+        jobs.push_back({sequence.frames[i].place, i, false});
+    for (std::uint32_t i = 0; i < sequence.samples.size(); ++i)
+        jobs.push_back({sequence.samples[i].place, i, true});
     std::sort(jobs.begin(), jobs.end(), [](const Job& a, const Job& b) {
         return std::tie(a.place.file, a.place.chunk, a.place.item) <
                std::tie(b.place.file, b.place.chunk, b.place.item);
@@ -95,10 +95,11 @@ std::string imu_yaml(const SelectedImu& imu, const std::optional<ImuNoise>& nois
 class EurocExport {
  public:
     EurocExport(const Recording& recording, const Selection& selection,
-                const std::vector<ExportFormat>& formats, const fs::path& directory,
-                const ExportWatch& watch)
+                const SelectedSequence& sequence, const std::vector<ExportFormat>& formats,
+                const fs::path& directory, const ExportWatch& watch)
         : recording_(recording),
           selection_(selection),
+          sequence_(sequence),
           formats_(formats),
           mav_(directory / "mav0"),
           watch_(watch),
@@ -183,21 +184,21 @@ class EurocExport {
     }
 
     Expected<> write_items() {
-        const std::vector<Job> jobs = jobs_of(selection_);
+        const std::vector<Job> jobs = jobs_of(sequence_);
         for (std::size_t done = 0; done < jobs.size(); ++done) {
             if (watch_.stopped()) return stopped_error();
             const Job& job = jobs[done];
             Expected<> written;
             auto read = recording_.at(job.place, [&](const RecordedItem& item) {
                 if (job.sample)
-                    write_sample(selection_.samples[job.index].imu, item);
+                    write_sample(sequence_.samples[job.index].imu, item);
                 else
-                    written = write_frame(selection_.frames[job.index], item);
+                    written = write_frame(sequence_.frames[job.index], item);
                 return true;
             });
             if (!read) return read;
             if (!written) return written;
-            if (!job.sample) watch_.show("images", ++frames_, selection_.frames.size());
+            if (!job.sample) watch_.show("images", ++frames_, sequence_.frames.size());
         }
         return {};
     }
@@ -250,13 +251,14 @@ class EurocExport {
 
     Expected<> write_lists() const {
         std::string times;
-        for (const SelectedFrame& frame : selection_.frames)
+        for (const SelectedFrame& frame : sequence_.frames)
             if (frame.camera == 0) times += fmt::format("{}\n", frame.name.ns);
         return write_new_file(mav_ / "times.txt", times);
     }
 
     const Recording& recording_;
     const Selection& selection_;
+    const SelectedSequence& sequence_;
     const std::vector<ExportFormat>& formats_;
     const fs::path mav_;
     const ExportWatch& watch_;
@@ -269,10 +271,10 @@ class EurocExport {
 }  // namespace
 
 Expected<> export_euroc(const Recording& recording, const Selection& selection,
-                        const std::vector<ExportFormat>& formats,
+                        const SelectedSequence& sequence, const std::vector<ExportFormat>& formats,
                         const ExportCalibration& calibration, const fs::path& directory,
                         const ExportWatch& watch, std::vector<std::string>& notes) {
-    EurocExport exported(recording, selection, formats, directory, watch);
+    EurocExport exported(recording, selection, sequence, formats, directory, watch);
     auto written = exported.run(calibration);
     exported.note_exposures(notes);
     return written;

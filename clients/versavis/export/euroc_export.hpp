@@ -14,7 +14,7 @@ namespace versavis::client {
 /// `formats` are those of the selection's cameras. Errors: the file is damaged, the disk is full,
 /// stopped.
 Expected<> export_euroc(const Recording& recording, const Selection& selection,
-                        const std::vector<ExportFormat>& formats,
+                        const SelectedSequence& sequence, const std::vector<ExportFormat>& formats,
                         const ExportCalibration& calibration,
                         const std::filesystem::path& directory, const ExportWatch& watch,
                         std::vector<std::string>& notes);

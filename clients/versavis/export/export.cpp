@@ -15,6 +15,7 @@
 #include "export/euroc_export.hpp"
 #include "export/export_directory.hpp"
 #include "posix/file.hpp"
+#include "verify/verification.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {
@@ -186,6 +187,13 @@ void note_peculiarities(const std::vector<ExportFormat>& formats, ExportKind kin
                       "a format of 8 bits for it, or export with --to euroc"
                     : ""));
     }
+    if (selection.seconds_doubted > 0)
+        report.notes.push_back(fmt::format(
+            "{} stamps may be off by whole seconds, all alike: receiver and host differed",
+            selection.seconds_doubted));
+    if (selection.sequences.size() == 1 && selection.sequences[0].bounds.joined)
+        report.notes.emplace_back(
+            "--join: all is one sequence, across restarts, epochs and holes of the IMU");
     for (const auto& imu : selection.imus) {
         if (imu.samples == 0)
             report.notes.push_back(fmt::format("{}: has no sample to export", imu.name));
@@ -215,6 +223,25 @@ void note_recording(const Recording& recording, ExportReport& report) {
             fmt::format("{}: {} items were lost while recording", stream, items));
 }
 
+Expected<> export_sequence(const Recording& recording, const ExportSettings& settings,
+                           const std::vector<ExportFormat>& formats,
+                           const ExportCalibration& calibration, std::size_t index,
+                           const std::filesystem::path& directory, ExportReport& report) {
+    std::error_code error;
+    std::filesystem::create_directories(directory, error);
+    if (error) return failure(directory.string(), "cannot be created: " + error.message());
+    const SelectedSequence& sequence = report.selection.sequences[index];
+    const auto stem = std::filesystem::path(settings.recording).stem().string();
+    auto written =
+        settings.kind == ExportKind::euroc
+            ? export_euroc(recording, report.selection, sequence, formats, calibration, directory,
+                           settings.watch, report.notes)
+            : export_bag(recording, report.selection, sequence, formats,
+                         directory / (stem + ".bag"), settings.compression, settings.watch);
+    if (!written) return written;
+    return write_kalibr(report.selection, calibration, directory);
+}
+
 Expected<> export_selected(const Recording& recording, const ExportSettings& settings,
                            const std::filesystem::path& directory, ExportReport& report) {
     auto selection = select_items(recording, settings.choice, settings.watch);
@@ -233,55 +260,32 @@ Expected<> export_selected(const Recording& recording, const ExportSettings& set
     const auto calibration = find_calibration(recording, settings, report);
     if (!calibration) return Unexpected(calibration.error());
     note_peculiarities(formats, settings.kind, report);
-    const auto stem = std::filesystem::path(settings.recording).stem().string();
-    auto written =
-        settings.kind == ExportKind::euroc
-            ? export_euroc(recording, report.selection, formats, *calibration, directory,
-                           settings.watch, report.notes)
-            : export_bag(recording, report.selection, formats, directory / (stem + ".bag"),
-                         settings.compression, settings.watch);
-    if (!written) return written;
-    if (auto kalibr = write_kalibr(report.selection, *calibration, directory); !kalibr)
-        return kalibr;
+    for (std::size_t i = 0; i < report.selection.sequences.size(); ++i)
+        if (auto written =
+                export_sequence(recording, settings, formats, *calibration, i,
+                                directory / sequence_folder(report.selection, i), report);
+            !written)
+            return written;
     return write_left_out(report.selection, directory);
 }
 
-using Counts = std::map<std::string, std::map<std::string, std::uint64_t>>;
-
-Counts count_left_out(const Selection& selection) {
-    Counts counts;
-    for (const auto& item : selection.left_out)
-        ++counts[selection.stream(item.stream)][to_string(item.reason)];
-    return counts;
-}
-
-std::string left_out_text(const Counts& counts, const std::string& stream) {
-    const auto found = counts.find(stream);
-    if (found == counts.end()) return "";
-    std::string text;
-    for (const auto& [reason, count] : found->second)
-        text += fmt::format("{}{} {}", text.empty() ? "; left out: " : ", ", count, reason);
-    return text;
-}
-
-nlohmann::json as_json(const ExportReport& report) {
-    const Counts counts = count_left_out(report.selection);
-    nlohmann::json streams = nlohmann::json::array();
-    const auto add = [&](const std::string& name, std::uint64_t items, double rate) {
-        const auto found = counts.find(name);
-        streams.push_back({{"name", name},
-                           {"exported", items},
-                           {"rate_hz", rate},
-                           {"left_out", found == counts.end() ? nlohmann::json::object()
-                                                              : nlohmann::json(found->second)}});
-    };
-    for (const auto& one : report.selection.cameras) add(one.name, one.frames, one.rate_hz);
-    for (const auto& one : report.selection.imus) add(one.name, one.samples, one.rate_hz);
-    return {{"directory", report.directory},
-            {"sets", report.selection.sets},
-            {"streams", streams},
-            {"files", report.written},
-            {"notes", report.notes}};
+/// The verdict on all stamps, which does not depend on what was selected.
+Expected<> write_verification(const ExportSettings& settings,
+                              const std::filesystem::path& directory, ExportReport& report) {
+    settings.watch.show("stamps verified", 0, 1);
+    auto verified = verify_recording(settings.recording, [&] { return !settings.watch.stopped(); });
+    if (settings.watch.stopped()) return stopped_error();
+    if (!verified) {
+        report.notes.push_back("its stamps cannot be verified: " + verified.error().message());
+        return {};
+    }
+    report.verdict = verified->sentence();
+    if (auto written = write_new_file(directory / "verification.html", to_html(*verified));
+        !written)
+        return written;
+    return write_new_file(
+        directory / "verification.json",
+        to_json(*verified).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace
@@ -307,30 +311,12 @@ Expected<ExportReport> export_recording(const ExportSettings& settings) {
         return Unexpected(written.error());
     }
     note_recording(*recording, report);
+    if (auto written = write_verification(settings, directory->part(), report); !written)
+        return Unexpected(written.error());
+    if (auto written = write_new_file(directory->part() / "README.txt", readme(report)); !written)
+        return Unexpected(written.error());
     if (auto finished = directory->finish(); !finished) return Unexpected(finished.error());
     return report;
-}
-
-std::string to_text(const ExportReport& report, bool json) {
-    if (json)
-        return as_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
-               "\n";
-    const Counts counts = count_left_out(report.selection);
-    std::string text = report.directory + ":\n";
-    if (report.selection.cameras.size() > 1)
-        text += fmt::format("  {} sets of {} cameras\n", report.selection.sets,
-                            report.selection.cameras.size());
-    for (const auto& one : report.selection.cameras)
-        text += fmt::format("  {}: {} frames, {:.2f} Hz{}\n", one.name, one.frames, one.rate_hz,
-                            left_out_text(counts, one.name));
-    for (const auto& one : report.selection.imus)
-        text += fmt::format("  {}: {} samples, {:.2f} Hz, longest gap {:.1f} ms{}\n", one.name,
-                            one.samples, one.rate_hz, static_cast<double>(one.longest_gap.ns) / 1e6,
-                            left_out_text(counts, one.name));
-    for (const auto& file : report.written) text += "  " + file + "\n";
-    if (!report.selection.left_out.empty()) text += "  left_out.csv lists what was left out\n";
-    for (const auto& note : report.notes) text += "  note: " + note + "\n";
-    return text;
 }
 
 }  // namespace versavis::client

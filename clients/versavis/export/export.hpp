@@ -37,6 +37,7 @@ struct ExportReport {
     Selection selection;               ///< of euroc and bag
     std::vector<std::string> written;  ///< of csv: "cam0.csv: 120 rows"
     std::vector<std::string> notes;    ///< what the user should know before believing it
+    std::string verdict;               ///< of all stamps; empty: they could not be verified
 };
 
 /// Topics of a bag and of the YAML files.
@@ -47,6 +48,12 @@ std::string imu_topic(const std::string& imu);
 /// full, stopped. Then there is no directory.
 Expected<ExportReport> export_recording(const ExportSettings& settings);
 
+/// Where in the export a sequence is; empty: it is the only one.
+std::string sequence_folder(const Selection& selection, std::size_t index);
+
 std::string to_text(const ExportReport& report, bool json);
+
+/// README.txt of the export.
+std::string readme(const ExportReport& report);
 
 }  // namespace versavis::client

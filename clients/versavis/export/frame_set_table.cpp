@@ -9,11 +9,11 @@ namespace versavis::client {
 
 namespace {
 
-using Key = std::tuple<std::uint64_t, std::uint32_t, std::uint64_t>;
+using Key = std::tuple<Continuity, std::uint64_t>;
 
 std::optional<Key> key_of(const TableFrame& frame) {
     if (!frame.tick) return std::nullopt;
-    return Key{frame.life, frame.epoch, *frame.tick};
+    return Key{frame.continuity, *frame.tick};
 }
 
 using Index = std::map<Key, std::size_t>;
@@ -46,20 +46,24 @@ const char* to_string(SkipReason reason) {
         case SkipReason::no: return "exported";
         case SkipReason::suspect: return "suspect";
         case SkipReason::arrival: return "arrival_only";
+        case SkipReason::edge: return "trigger_edge";
+        case SkipReason::holdover: return "holdover";
+        case SkipReason::sigma: return "sigma";
         case SkipReason::incomplete: return "incomplete_set";
         case SkipReason::outside_imu: return "outside_imu";
         case SkipReason::not_later: return "not_later";
         case SkipReason::repeated: return "repeated";
         case SkipReason::no_pixels: return "no_pixels";
         case SkipReason::another_size: return "another_size";
+        case SkipReason::brief: return "brief_sequence";
     }
     return "unknown";
 }
 
-bool FrameSetTable::inside(const FrameSet& set, OutputTime after, OutputTime before) const {
+bool FrameSetTable::inside(const FrameSet& set, const SequenceBounds& sequence) const {
     for (std::size_t camera = 0; camera < frames_.size(); ++camera) {
-        const OutputTime time = frames_[camera][set.frames[camera]].time;
-        if (time <= after || time >= before) return false;
+        const TableFrame& frame = frames_[camera][set.frames[camera]];
+        if (!sequence.has(frame.continuity, frame.time)) return false;
     }
     return true;
 }
@@ -69,8 +73,9 @@ void FrameSetTable::mark(const FrameSet& set, SkipReason reason) {
         frames_[camera][set.frames[camera]].left_out = reason;
 }
 
-std::vector<FrameSet> FrameSetTable::pair(OutputTime after, OutputTime before) {
+std::vector<FrameSet> FrameSetTable::pair(const std::vector<SequenceBounds>& sequences) {
     std::vector<FrameSet> sets;
+    std::vector<OutputTime> newest(sequences.size(), SequenceBounds::earliest);
     if (frames_.empty()) return sets;
     std::vector<Index> others;
     for (std::size_t camera = 1; camera < frames_.size(); ++camera)
@@ -80,19 +85,25 @@ std::vector<FrameSet> FrameSetTable::pair(OutputTime after, OutputTime before) {
     for (std::size_t i = 0; i < frames_[0].size(); ++i) {
         const TableFrame& first = frames_[0][i];
         if (first.left_out != SkipReason::no) continue;
-        FrameSet set{first.time, partners(others, first)};
+        FrameSet set{first.time, partners(others, first), 0};
         if (set.frames.size() != others.size()) continue;
         set.frames.insert(set.frames.begin(), i);
         // A second frame of the first camera with the same tick finds its partners taken.
         if (frames_.size() > 1 && paired[1][set.frames[1]]) continue;
         for (std::size_t camera = 0; camera < frames_.size(); ++camera)
             paired[camera][set.frames[camera]] = true;
-        if (!inside(set, after, before))
+        const auto sequence =
+            std::find_if(sequences.begin(), sequences.end(),
+                         [&](const SequenceBounds& one) { return inside(set, one); });
+        set.sequence = static_cast<std::size_t>(sequence - sequences.begin());
+        if (sequence == sequences.end()) {
             mark(set, SkipReason::outside_imu);
-        else if (!sets.empty() && set.name <= sets.back().name)
+        } else if (set.name <= newest[set.sequence]) {
             mark(set, SkipReason::not_later);
-        else
+        } else {
+            newest[set.sequence] = set.name;
             sets.push_back(std::move(set));
+        }
     }
     for (std::size_t camera = 0; camera < frames_.size(); ++camera)
         for (std::size_t i = 0; i < frames_[camera].size(); ++i)

@@ -19,8 +19,9 @@ constexpr Duration longest_without = milliseconds(20);
 /// Items between two looks at the clock of the progress line.
 constexpr std::uint64_t progress_step = 4096;
 
-constexpr OutputTime earliest{std::numeric_limits<std::int64_t>::min()};
-constexpr OutputTime latest{std::numeric_limits<std::int64_t>::max()};
+/// Sigma of a stamp that is too large for odometry, unless the user says otherwise: at one radian a
+/// second, images are off by a pixel with a fifth of it.
+constexpr Duration usual_max_sigma = milliseconds(5);
 
 /// `cam2` before `cam10`.
 bool by_name(const std::string& a, const std::string& b) {
@@ -31,24 +32,40 @@ bool by_name(const std::string& a, const std::string& b) {
                : a < b;
 }
 
-double rate(std::uint64_t items, Duration span) {
-    return items < 2 || span.ns <= 0
-               ? 0
-               : static_cast<double>(items - 1) * 1e9 / static_cast<double>(span.ns);
-}
+/// Items of one stream, whose rate is counted within sequences.
+struct RateCount {
+    std::uint64_t periods = 0;
+    Duration span;
+
+    void add(std::uint64_t items, Duration length) {
+        if (items < 2) return;
+        periods += items - 1;
+        span = span + length;
+    }
+    double hz() const {
+        return span.ns <= 0 ? 0 : static_cast<double>(periods) * 1e9 / static_cast<double>(span.ns);
+    }
+};
+
+/// A sample that is worth to be exported, wherever it belongs.
+struct Candidate {
+    TimedSample at;
+    std::uint64_t number;
+    ItemPlace place;
+};
 
 /// One IMU on the way through the file.
 struct ImuWay {
-    std::optional<OutputTime> first;
-    OutputTime last;
+    std::vector<Candidate> candidates;
 
-    SkipReason judge(OutputTime time, std::uint32_t flags, const ExportChoice& choice) const {
-        if ((flags & (flag_suspect | flag_sensor_error)) != 0 && !choice.include_suspect)
-            return SkipReason::suspect;
-        if (first && time <= last) return SkipReason::not_later;
-        const bool repeated = (flags & flag_repeated) != 0 && !choice.keep_repeated;
-        if (repeated && first && time - last <= longest_without) return SkipReason::repeated;
-        return SkipReason::no;
+    /// What its place behind those before says.
+    SkipReason judge(const TimedSample& at, bool repeated, bool join) const {
+        if (candidates.empty()) return SkipReason::no;
+        const TimedSample& last = candidates.back().at;
+        if (!join && !(at.continuity == last.continuity)) return SkipReason::no;
+        if (at.time <= last.time) return SkipReason::not_later;
+        return repeated && at.time - last.time <= longest_without ? SkipReason::repeated
+                                                                  : SkipReason::no;
     }
 };
 
@@ -62,18 +79,20 @@ class Selector {
         FrameSetTable table(selection_.cameras.size());
         ways_.resize(selection_.imus.size());
         if (auto read = read_all(table); !read) return Unexpected(read.error());
-        OutputTime after = earliest;
-        OutputTime before = latest;
-        for (const ImuWay& way : ways_) {
-            if (!way.first) continue;  // it had failed: its images are as good as without it
-            after = std::max(after, *way.first);
-            before = std::min(before, way.last);
+        const auto bounds =
+            find_sequences(times_of_samples(), times_of_frames(table), choice_.join);
+        for (const SequenceBounds& one : bounds) {
+            selection_.sequences.emplace_back();
+            selection_.sequences.back().bounds = one;
         }
-        take_sets(table, table.pair(after, before));
+        take_sets(table, table.pair(bounds));
+        take_samples();
+        drop_empty();
+        describe_streams();
         list_left_out(table);
-        if (selection_.frames.empty() && selection_.samples.empty())
-            return failure(recording_name_, "has nothing to export",
-                           "see 'versavis info', and --include-suspect");
+        if (selection_.sequences.empty())
+            return failure(recording_name_, "has nothing to export" + most_left_out(),
+                           "see 'versavis info', --max-sigma and --include-suspect");
         return std::move(selection_);
     }
 
@@ -132,11 +151,24 @@ class Selector {
         return read;
     }
 
+    /// What the stamp itself says, best reason first.
+    SkipReason judge(StampKind kind, std::uint32_t flags, std::uint32_t sigma_ns) const {
+        if (!choice_.include_suspect) {
+            if (kind == StampKind::arrival) return SkipReason::arrival;
+            if ((flags & (flag_suspect | flag_sensor_error)) != 0) return SkipReason::suspect;
+            if (kind == StampKind::trigger_edge) return SkipReason::edge;
+            if ((flags & flag_holdover) != 0) return SkipReason::holdover;
+        }
+        if (choice_.include_suspect && !choice_.max_sigma) return SkipReason::no;
+        return Duration{sigma_ns} > choice_.max_sigma.value_or(usual_max_sigma) ? SkipReason::sigma
+                                                                                : SkipReason::no;
+    }
+
     void take_frame(FrameSetTable& table, const RecordedItem& item) {
         const auto data = unpack<FrameMetadata>(item.metadata);
         const std::uint32_t index = cameras_.at(item.stream);
         SelectedCamera& camera = selection_.cameras[index];
-        TableFrame frame{item.time, item.number, item.life, data.epoch, {}, item.place};
+        TableFrame frame{item.time, item.number, {item.life, data.epoch}, {}, item.place};
         if (data.trigger != 0) frame.tick = data.tick();
         if (camera.width == 0) {
             camera.width = data.width;
@@ -148,47 +180,144 @@ class Selector {
         else if (data.width != camera.width || data.height != camera.height ||
                  data.pixel_format != camera.pixel_format)
             frame.left_out = SkipReason::another_size;
-        else if (!choice_.include_suspect && data.stamp_kind() == StampKind::arrival)
-            frame.left_out = SkipReason::arrival;
-        else if (!choice_.include_suspect && (data.flags & (flag_suspect | flag_sensor_error)) != 0)
-            frame.left_out = SkipReason::suspect;
+        else
+            frame.left_out = judge(data.stamp_kind(), data.flags, data.sigma_ns);
+        if (frame.left_out == SkipReason::no) note_stamp(camera, data.sigma_ns, data.flags);
         table.add(index, frame);
+    }
+
+    template <class Selected>
+    void note_stamp(Selected& stream, std::uint32_t sigma_ns, std::uint32_t flags) {
+        stream.largest_sigma_ns = std::max(stream.largest_sigma_ns, sigma_ns);
+        if ((flags & flag_second_doubted) != 0) ++selection_.seconds_doubted;
     }
 
     void take_sample(const RecordedItem& item) {
         const auto data = unpack<ImuMetadata>(item.metadata);
         const std::uint32_t index = imus_.at(item.stream);
+        const TimedSample at{item.time, {item.life, data.epoch}};
+        const bool repeated = (data.flags & flag_repeated) != 0 && !choice_.keep_repeated;
+        SkipReason reason = judge(StampKind::measured_middle, data.flags, data.sigma_ns);
+        if (reason == SkipReason::no) reason = ways_[index].judge(at, repeated, choice_.join);
+        if (reason != SkipReason::no) return leave_out(index, item.number, item.time, reason);
         SelectedImu& imu = selection_.imus[index];
-        ImuWay& way = ways_[index];
-        const SkipReason reason = way.judge(item.time, data.flags, choice_);
-        if (reason != SkipReason::no) {
-            selection_.left_out.push_back(
-                {static_cast<std::uint32_t>(selection_.cameras.size() + index), item.time,
-                 item.number, 0, reason});
-            return;
-        }
-        if (way.first) imu.longest_gap = std::max(imu.longest_gap, item.time - way.last);
-        if (!way.first) way.first = item.time;
-        way.last = item.time;
-        ++imu.samples;
-        imu.rate_hz = rate(imu.samples, way.last - *way.first);
         imu.filter_delay = data.filter_delay;
         if (std::abs(data.accel_age_ns) > std::abs(imu.accel_age_ns))
             imu.accel_age_ns = data.accel_age_ns;
-        selection_.samples.push_back({index, item.time, item.place});
+        note_stamp(imu, data.sigma_ns, data.flags);
+        ways_[index].candidates.push_back({at, item.number, item.place});
+    }
+
+    void leave_out(std::uint32_t imu, std::uint64_t number, OutputTime time, SkipReason reason) {
+        selection_.left_out.push_back(
+            {static_cast<std::uint32_t>(selection_.cameras.size() + imu), time, number, 0, reason});
+    }
+
+    std::vector<std::vector<TimedSample>> times_of_samples() const {
+        std::vector<std::vector<TimedSample>> times;
+        for (const ImuWay& way : ways_) {
+            times.emplace_back();
+            for (const Candidate& one : way.candidates) times.back().push_back(one.at);
+        }
+        return times;
+    }
+
+    std::vector<TimedSample> times_of_frames(const FrameSetTable& table) const {
+        std::vector<TimedSample> times;
+        for (std::size_t camera = 0; camera < selection_.cameras.size(); ++camera)
+            for (const TableFrame& frame : table.frames(camera))
+                times.push_back({frame.time, frame.continuity});
+        return times;
     }
 
     void take_sets(const FrameSetTable& table, const std::vector<FrameSet>& sets) {
-        selection_.sets = sets.size();
-        for (const FrameSet& set : sets)
+        for (const FrameSet& set : sets) {
+            SelectedSequence& sequence = selection_.sequences[set.sequence];
+            ++sequence.sets;
             for (std::uint32_t camera = 0; camera < set.frames.size(); ++camera) {
                 const TableFrame& frame = table.frames(camera)[set.frames[camera]];
-                selection_.frames.push_back({camera, frame.time, set.name, frame.place});
+                sequence.frames.push_back({camera, frame.time, set.name, frame.place});
+                widen(sequence, frame.time);
             }
-        for (auto& camera : selection_.cameras) {
-            camera.frames = sets.size();
-            if (!sets.empty()) camera.rate_hz = rate(sets.size(), sets.back().name - sets[0].name);
         }
+    }
+
+    void take_samples() {
+        for (std::uint32_t imu = 0; imu < ways_.size(); ++imu)
+            for (const Candidate& one : ways_[imu].candidates) {
+                const auto sequence = std::find_if(
+                    selection_.sequences.begin(), selection_.sequences.end(), [&](const auto& s) {
+                        return s.bounds.fits(one.at.continuity) && s.bounds.first <= one.at.time &&
+                               one.at.time <= s.bounds.last;
+                    });
+                if (sequence == selection_.sequences.end()) {
+                    leave_out(imu, one.number, one.at.time, SkipReason::brief);
+                    continue;
+                }
+                sequence->samples.push_back({imu, one.at.time, one.place, one.number});
+                widen(*sequence, one.at.time);
+            }
+    }
+
+    static void widen(SelectedSequence& sequence, OutputTime time) {
+        sequence.first = std::min(sequence.first, time);
+        sequence.last = std::max(sequence.last, time);
+    }
+
+    /// Those without images are of use only where there are no images at all.
+    void drop_empty() {
+        auto& all = selection_.sequences;
+        const bool images = std::any_of(all.begin(), all.end(),
+                                        [](const SelectedSequence& one) { return one.sets > 0; });
+        const auto kept =
+            std::stable_partition(all.begin(), all.end(), [&](const SelectedSequence& one) {
+                return images ? one.sets > 0 : !one.samples.empty();
+            });
+        for (auto one = kept; one != all.end(); ++one)
+            for (const SelectedSample& sample : one->samples)
+                leave_out(sample.imu, sample.number, sample.time, SkipReason::brief);
+        all.erase(kept, all.end());
+    }
+
+    void describe_streams() {
+        std::vector<RateCount> rates(ways_.size());
+        RateCount sets;
+        for (const SelectedSequence& sequence : selection_.sequences) {
+            selection_.sets += sequence.sets;
+            if (sequence.sets > 0)
+                sets.add(sequence.sets, sequence.frames.back().name - sequence.frames[0].name);
+            std::vector<std::vector<OutputTime>> times(ways_.size());
+            for (const SelectedSample& sample : sequence.samples)
+                times[sample.imu].push_back(sample.time);
+            for (std::size_t imu = 0; imu < times.size(); ++imu)
+                describe(selection_.imus[imu], times[imu], rates[imu]);
+        }
+        for (std::size_t imu = 0; imu < rates.size(); ++imu)
+            selection_.imus[imu].rate_hz = rates[imu].hz();
+        for (auto& camera : selection_.cameras) {
+            camera.frames = selection_.sets;
+            camera.rate_hz = sets.hz();
+        }
+    }
+
+    static void describe(SelectedImu& imu, const std::vector<OutputTime>& times, RateCount& rate) {
+        if (times.empty()) return;
+        imu.samples += times.size();
+        rate.add(times.size(), times.back() - times.front());
+        for (std::size_t i = 1; i < times.size(); ++i)
+            imu.longest_gap = std::max(imu.longest_gap, times[i] - times[i - 1]);
+    }
+
+    /// The reason of most.
+    std::string most_left_out() const {
+        std::map<SkipReason, std::uint64_t> counts;
+        for (const LeftOutItem& one : selection_.left_out) ++counts[one.reason];
+        const auto most =
+            std::max_element(counts.begin(), counts.end(),
+                             [](const auto& a, const auto& b) { return a.second < b.second; });
+        return most == counts.end() ? ""
+                                    : fmt::format(": {} items are left out as '{}'", most->second,
+                                                  to_string(most->first));
     }
 
     void list_left_out(const FrameSetTable& table) {

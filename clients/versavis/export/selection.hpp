@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,11 @@
 namespace versavis::client {
 
 struct ExportChoice {
-    std::vector<std::string> streams;  ///< cameras and IMUs, in this order; empty: all, by name
-    bool include_suspect = false;      ///< frames of unproved pairing, and by arrival only
-    bool keep_repeated = false;        ///< IMU samples that repeat the one before
+    std::vector<std::string> streams;   ///< cameras and IMUs, in this order; empty: all, by name
+    bool include_suspect = false;       ///< whatever its stamp is worth
+    bool keep_repeated = false;         ///< IMU samples that repeat the one before
+    bool join = false;                  ///< one sequence, whatever lies between its parts
+    std::optional<Duration> max_sigma;  ///< none: 5 ms, or any with include_suspect
 };
 
 /// Called on the way, seldom enough to print.
@@ -42,6 +45,7 @@ struct SelectedSample {
     std::uint32_t imu;
     OutputTime time;
     ItemPlace place;
+    std::uint64_t number;
 };
 
 struct LeftOutItem {
@@ -59,6 +63,7 @@ struct SelectedCamera {
     std::uint32_t pixel_format = 0;
     double rate_hz = 0;
     std::uint64_t frames = 0;
+    std::uint32_t largest_sigma_ns = 0;
 };
 
 struct SelectedImu {
@@ -66,17 +71,28 @@ struct SelectedImu {
     double rate_hz = 0;
     std::uint64_t samples = 0;
     Duration filter_delay;          ///< of the last sample: already subtracted from its stamp
-    Duration longest_gap;           ///< between samples that are exported
+    Duration longest_gap;           ///< between samples of one sequence
     std::int32_t accel_age_ns = 0;  ///< the largest
+    std::uint32_t largest_sigma_ns = 0;
+};
+
+struct SelectedSequence {
+    SequenceBounds bounds;
+    std::vector<SelectedFrame> frames;    ///< set by set
+    std::vector<SelectedSample> samples;  ///< in the order of the file
+    std::uint64_t sets = 0;
+    /// Of what is exported. None of either: earliest after latest.
+    OutputTime first = SequenceBounds::latest;
+    OutputTime last = SequenceBounds::earliest;
 };
 
 struct Selection {
     std::vector<SelectedCamera> cameras;
     std::vector<SelectedImu> imus;
-    std::vector<SelectedFrame> frames;    ///< set by set
-    std::vector<SelectedSample> samples;  ///< in the order of the file
+    std::vector<SelectedSequence> sequences;  ///< at least one
     std::vector<LeftOutItem> left_out;
     std::uint64_t sets = 0;
+    std::uint64_t seconds_doubted = 0;  ///< stamps that may be off by whole seconds
 
     const std::string& stream(std::uint32_t index) const {
         return index < cameras.size() ? cameras[index].name : imus[index - cameras.size()].name;
