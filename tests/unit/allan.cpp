@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluate/allan.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <random>
 
 using namespace versavis;
@@ -155,7 +160,7 @@ TEST_CASE("allan: a recording too short for the walk says how long is needed", "
     CHECK_THAT(yaml.error().message(), Contains("too short") && Contains("record at least"));
 }
 
-TEST_CASE("allan: lost samples are interpolated while they are few", "[allan]") {
+TEST_CASE("allan: lost samples and seconds are filled in while they are few", "[allan]") {
     RestingImu imu = resting(100, 4e-5, 4e-4);
     const auto drop = [&](std::size_t at) {
         imu.times.erase(imu.times.begin() + static_cast<std::ptrdiff_t>(at));
@@ -169,10 +174,14 @@ TEST_CASE("allan: lost samples are interpolated while they are few", "[allan]") 
     REQUIRE(result);
     CHECK(result->missing == 3);
     CHECK(result->rate_hz == Approx(imu_rate_hz));
-    for (int i = 0; i < 30; ++i) drop(2000);
+    for (int i = 0; i < 200; ++i) drop(2000);
+    result = evaluate_allan(imu);
+    REQUIRE(result);
+    CHECK(density_of(result->gyro).value == Approx(2e-4).epsilon(0.02));
+    for (int i = 0; i < 300; ++i) drop(2000);
     result = evaluate_allan(imu);
     REQUIRE_FALSE(result);
-    CHECK_THAT(result.error().message(), Contains("33 of 20000 samples are missing"));
+    CHECK_THAT(result.error().message(), Contains("503 of 20000 samples are missing"));
 }
 
 TEST_CASE("allan: motion is reported with its time", "[allan]") {
@@ -188,4 +197,147 @@ TEST_CASE("allan: a few samples are refused", "[allan]") {
     const auto result = evaluate_allan(resting(3, 0, 0));
     REQUIRE_FALSE(result);
     CHECK_THAT(result.error().message(), Contains("too few"));
+}
+
+TEST_CASE("allan: single spikes are taken off, many are refused", "[allan]") {
+    RestingImu imu = resting(100, 4e-5, 4e-4);
+    imu.gyro[0][5000] = 3;
+    imu.gyro[0][5001] = 3;
+    imu.accel[2][12345] = -160;
+    auto result = evaluate_allan(imu);
+    REQUIRE(result);
+    CHECK(result->spikes == 3);
+    CHECK(density_of(result->gyro).value == Approx(2e-4).epsilon(0.02));
+    CHECK(density_of(result->accel).value == Approx(2e-3).epsilon(0.02));
+    for (std::size_t i = 100; i < 20'000; i += 100) imu.accel[1][i] = 50;
+    result = evaluate_allan(imu);
+    REQUIRE_FALSE(result);
+    CHECK_THAT(result.error().message(), Contains("202 values are far off") && Contains("cable"));
+}
+
+TEST_CASE("allan: a part that is read more often than it measures has the same noise", "[allan]") {
+    RestingImu imu = resting(400, 4e-5, 4e-4);
+    for (auto* axes : {&imu.gyro, &imu.accel})
+        for (auto& axis : *axes)
+            for (std::size_t i = 1; i < axis.size(); i += 2) axis[i] = axis[i - 1];
+    const auto result = evaluate_allan(imu);
+    REQUIRE(result);
+    CHECK(density_of(result->gyro).value == Approx(2e-4 * std::sqrt(2.0)).epsilon(0.05));
+}
+
+namespace {
+
+constexpr double hour_rate_hz = 100;
+constexpr double hour_s = 3600;
+
+/// An hour at rest, with what is added to the bias at a time in seconds.
+std::vector<float> hour_at_rest(unsigned seed, const std::function<double(double)>& added,
+                                double walk = 4e-5) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<float> rates;
+    double bias = 0.02;
+    for (double at_s = 0; at_s < hour_s; at_s += 1 / hour_rate_hz) {
+        bias += walk / std::sqrt(hour_rate_hz) * normal(random);
+        rates.push_back(static_cast<float>(bias + added(at_s) +
+                                           2e-4 * std::sqrt(hour_rate_hz) * normal(random)));
+    }
+    return rates;
+}
+
+/// Flicker noise of this instability, as processes of time constants from 1 to 2000 s.
+std::function<double(double)> flicker(unsigned seed, double instability) {
+    struct State {
+        std::mt19937_64 random;
+        std::normal_distribution<double> normal;
+        std::array<double, 12> processes{};
+    };
+    auto state = std::make_shared<State>();
+    state->random.seed(seed);
+    return [state, instability](double /*at_s*/) {
+        double sum = 0;
+        double constant_s = 1;
+        for (double& one : state->processes) {
+            const double kept = std::exp(-1 / hour_rate_hz / constant_s);
+            one = kept * one + std::sqrt(1 - kept * kept) * state->normal(state->random);
+            sum += one;
+            constant_s *= 2;
+        }
+        return instability * sum;
+    };
+}
+
+struct HostileScene {
+    const char* name;
+    std::function<double(double)> added;
+    double walk = 4e-5;
+    bool smooth = false;  ///< a random walk is not to be given
+};
+
+}  // namespace
+
+TEST_CASE("allan: a bias that drifts, settles or follows a temperature", "[statistics]") {
+    constexpr unsigned runs = 20;
+    const auto settling = [](double amount, double constant_s) {
+        return [=](double at_s) { return amount * std::exp(-at_s / constant_s); };
+    };
+    const auto wave = [](double amount, double period_s) {
+        return [=](double at_s) { return amount * std::sin(2 * M_PI * at_s / period_s); };
+    };
+    const std::vector<HostileScene> scenes{
+        {"a random walk alone", [](double /*at_s*/) { return 0; }},
+        {"a hardly visible one", [](double /*at_s*/) { return 0; }, 4e-6},
+        {"warming up for half an hour", settling(3e-3, 1800), 4e-6},
+        {"warming up for five minutes", settling(-5e-3, 300)},
+        {"a slow drift", [](double at_s) { return 2e-6 * at_s; }},
+        {"an air condition", wave(1e-3, 900), 4e-6, true},
+        {"a shadow in the morning", wave(5e-3, 2500), 4e-6, true},
+    };
+    for (const HostileScene& scene : scenes) {
+        CAPTURE(scene.name);
+        unsigned refused = 0;
+        unsigned walks = 0;
+        double walk_square = 0;
+        double density_square = 0;
+        unsigned beyond = 0;
+        for (unsigned seed = 0; seed < runs; ++seed) {
+            const auto axis =
+                axis_noise(hour_at_rest(seed, scene.added, scene.walk), 1 / hour_rate_hz);
+            REQUIRE(axis);
+            density_square += std::pow((axis->density.value - 2e-4) / axis->density.sigma, 2);
+            refused += axis->smooth ? 1 : 0;
+            if (!axis->smooth && axis->walk_limit < scene.walk) ++beyond;
+            if (!axis->walk) continue;
+            ++walks;
+            walk_square += std::pow((axis->walk->value - scene.walk) / axis->walk->sigma, 2);
+        }
+        WARN(
+            fmt::format("{}: {} of {} refused; {} walks, NEES {:.2f}; NEES of densities {:.2f}; "
+                        "{} limits too low",
+                        scene.name, refused, runs, walks, walks > 0 ? walk_square / walks : 0,
+                        density_square / runs, beyond));
+        CHECK(density_square / runs < 2);
+        if (scene.smooth) {
+            CHECK(refused >= runs - 1);
+        } else {
+            CHECK(refused <= 1);
+            CHECK(beyond <= 3);
+            if (walks > 0) CHECK(walk_square / walks < 2.5);
+        }
+    }
+}
+
+TEST_CASE("allan: flicker noise is neither a drift nor smooth", "[statistics]") {
+    unsigned refused = 0;
+    unsigned drifts = 0;
+    for (unsigned seed = 0; seed < 20; ++seed) {
+        const double instability = seed % 2 == 0 ? 2e-5 : 2e-4;
+        const auto axis = axis_noise(hour_at_rest(seed, flicker(seed + 100, instability), 4e-6),
+                                     1 / hour_rate_hz);
+        REQUIRE(axis);
+        refused += axis->smooth ? 1 : 0;
+        drifts += axis->drift ? 1 : 0;
+    }
+    CHECK(refused <= 1);
+    CHECK(drifts <= 2);
 }

@@ -117,14 +117,14 @@ int SensorCommands::run_imu(const Recording& recording) {
 int SensorCommands::run_allan(const Recording& recording) const {
     const auto name = find_stream(recording, ring::StreamKind::imu, settings_.imu);
     if (!name) return fail(name.error());
-    const auto imu =
-        read_imu(recording, *name, settings_.from_s, settings_.to_s, [this] { return !stop_(); });
+    const auto imu = read_imu(recording, *name, settings_.from_s, settings_.to_s, Repeated::kept,
+                              [this] { return !stop_(); });
     if (!imu) return fail(imu.error());
     const auto result = evaluate_allan(imu->samples);
     if (!result) return fail(result.error());
     fmt::print("{}", json_ ? to_json(*result).dump() + "\n" : to_text(*result));
     const double needed = walk_needs_s(*result);
-    if (yaml_.empty()) return needed > 0 ? EXIT_FAILURE : EX_OK;
+    if (yaml_.empty()) return needed > 0 || is_smooth(*result) ? EXIT_FAILURE : EX_OK;
     const auto text = kalibr_imu_yaml(*result, topic_.empty() ? imu_topic(*name) : topic_);
     if (!text) {
         fail(text.error());

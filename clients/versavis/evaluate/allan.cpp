@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/median.hpp"
 #include "evaluate/allan_report.hpp"
+#include "evaluate/resting_series.hpp"
 
 namespace versavis::client {
 
@@ -37,16 +37,6 @@ constexpr std::size_t least_points = 6;
 // Correlation of deviations at neighbouring octaves widens sigma by this; found from simulated
 // noise, where it makes the errors in sigmas one.
 constexpr double widening = 1.45;
-
-// A second in which the gyro scatters this many times more than usually is motion. If lower, bursts
-// of noise are taken for it; if higher, gentle touches pass.
-constexpr double motion_factor = 6;
-
-// Share of samples that may be missing, and are interpolated.
-constexpr double most_missing = 0.001;
-
-// A shorter recording does not show white noise and motion.
-constexpr double least_duration_s = 10;
 
 double square(double x) { return x * x; }
 
@@ -187,7 +177,10 @@ std::vector<AllanPoint> allan_deviation(std::span<const float> rates, double int
     return points;
 }
 
-Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) {
+namespace {
+
+/// Of noise alone.
+Expected<AxisNoise> noise_without_drift(std::span<const float> rates, double interval_s) {
     AxisNoise axis;
     axis.points = allan_deviation(rates, interval_s);
     const bool silent = std::any_of(axis.points.begin(), axis.points.end(),
@@ -218,6 +211,7 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
         return Measured{value, value > 0 ? sigma / (2 * value) : std::sqrt(sigma)};
     };
     axis.density = root(0);
+    axis.white_from_s = used.front().tau_s;
     axis.flicker = root(1).value;
     const std::size_t first_m = std::size_t{1} << *first;
     const double square_sigma = walk_square_sigma(*noises, n, interval_s, first_m);
@@ -230,70 +224,38 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
     return axis;
 }
 
+}  // namespace
+
+Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) {
+    auto axis = noise_without_drift(rates, interval_s);
+    if (!axis) return axis;
+    const BiasHistory history =
+        bias_history(rates, interval_s, axis->density.value, axis->white_from_s);
+    if (history.drift) {
+        std::vector<float> steady(rates.begin(), rates.end());
+        for (std::size_t i = 0; i < steady.size(); ++i)
+            steady[i] -= static_cast<float>(history.drift->at(static_cast<double>(i) * interval_s));
+        axis = noise_without_drift(steady, interval_s);
+        if (!axis) return axis;
+        axis->drift = history.drift;
+        axis->walk_limit = std::max(axis->walk_limit, history.walk_limit);
+    }
+    axis->smooth = history.smooth;
+    if (axis->smooth) {
+        axis->walk.reset();
+        axis->walk_needs_s = 0;
+    }
+    return axis;
+}
+
 namespace {
 
-/// Rates at even intervals; what is missing in between lies on a straight line.
-std::vector<float> evened(const std::vector<OutputTime>& times, const std::vector<float>& rates,
-                          double interval_ns) {
-    std::vector<float> even;
-    even.reserve(rates.size());
-    for (std::size_t i = 0; i < rates.size(); ++i) {
-        if (i > 0) {
-            const auto gap = static_cast<double>((times[i] - times[i - 1]).ns);
-            const auto steps = static_cast<std::int64_t>(std::lround(gap / interval_ns));
-            for (std::int64_t k = 1; k < steps; ++k)
-                even.push_back(rates[i - 1] + (rates[i] - rates[i - 1]) * static_cast<float>(k) /
-                                                  static_cast<float>(steps));
-        }
-        even.push_back(rates[i]);
-    }
-    return even;
-}
-
-/// The usual time between samples: lost ones do not change it.
-double interval_ns(const std::vector<OutputTime>& times) {
-    std::vector<double> gaps;
-    gaps.reserve(times.size());
-    for (std::size_t i = 1; i < times.size(); ++i)
-        gaps.push_back(static_cast<double>((times[i] - times[i - 1]).ns));
-    const double usual = median(gaps);
-    double total = 0;
-    std::size_t count = 0;
-    for (const double gap : gaps)
-        if (gap < 1.5 * usual) total += gap, ++count;
-    return total / static_cast<double>(count);
-}
-
-/// The first second in which the gyro scattered more than at rest.
-std::optional<std::size_t> second_of_motion(const std::array<std::vector<float>, 3>& gyro,
-                                            std::size_t per_second) {
-    std::vector<double> scatters;
-    for (std::size_t at = 0; at + per_second <= gyro[0].size(); at += per_second) {
-        double scatter = 0;
-        for (const auto& axis : gyro) {
-            double sum = 0;
-            double squares = 0;
-            for (std::size_t i = at; i < at + per_second; ++i) {
-                sum += axis[i];
-                squares += square(axis[i]);
-            }
-            const auto count = static_cast<double>(per_second);
-            scatter += squares / count - square(sum / count);
-        }
-        scatters.push_back(std::sqrt(std::max(scatter, 0.0)));
-    }
-    const double limit = motion_factor * median(scatters);
-    for (std::size_t i = 0; i < scatters.size(); ++i)
-        if (scatters[i] > limit) return i;
-    return std::nullopt;
-}
-
-Expected<> noise_of(const std::array<std::vector<float>, 3>& rates, const RestingImu& imu,
-                    double interval, const char* what, std::array<AxisNoise, 3>& axes) {
+Expected<> noise_of(const std::array<std::vector<float>, 3>& rates, const char* what,
+                    const std::string& name, double interval_s, std::array<AxisNoise, 3>& axes) {
     for (std::size_t i = 0; i < 3; ++i) {
-        auto noise = axis_noise(evened(imu.times, rates[i], interval), interval * 1e-9);
+        auto noise = axis_noise(rates[i], interval_s);
         if (!noise)
-            return failure(fmt::format("{}, {} {}", imu.name, what, "xyz"[i]), noise.error().what,
+            return failure(fmt::format("{}, {} {}", name, what, "xyz"[i]), noise.error().what,
                            noise.error().cure);
         axes[i] = std::move(*noise);
     }
@@ -303,30 +265,17 @@ Expected<> noise_of(const std::array<std::vector<float>, 3>& rates, const Restin
 }  // namespace
 
 Expected<AllanResult> evaluate_allan(const RestingImu& imu) {
+    const auto series = resting_series(imu);
+    if (!series) return Unexpected(series.error());
     AllanResult result;
     result.name = imu.name;
-    const auto count = imu.times.size();
-    if (count >= 2)
-        result.duration_s = static_cast<double>((imu.times.back() - imu.times.front()).ns) * 1e-9;
-    if (count < 100 || result.duration_s < least_duration_s)
-        return failure(imu.name, fmt::format("{} samples are too few", count),
-                       "record some hours at rest");
-    const double interval = interval_ns(imu.times);
-    result.rate_hz = 1e9 / interval;
-    const auto expected =
-        static_cast<std::uint64_t>(std::llround(result.duration_s * result.rate_hz)) + 1;
-    result.missing = expected > count ? expected - count : 0;
-    if (static_cast<double>(result.missing) > most_missing * static_cast<double>(expected))
-        return failure(imu.name,
-                       fmt::format("{} of {} samples are missing", result.missing, expected),
-                       "record without loss: 'versavis info' says where it is");
-    const auto moved =
-        second_of_motion(imu.gyro, static_cast<std::size_t>(std::lround(result.rate_hz)));
-    if (moved)
-        return failure(imu.name, fmt::format("it was moved {} s after the start", *moved),
-                       "leave it at rest, or choose a part of the recording by --from and --to");
-    auto done = noise_of(imu.gyro, imu, interval, "gyro", result.gyro);
-    if (done) done = noise_of(imu.accel, imu, interval, "accelerometer", result.accel);
+    result.rate_hz = 1 / series->interval_s;
+    result.duration_s = series->duration_s;
+    result.missing = series->missing;
+    result.spikes = series->spikes;
+    auto done = noise_of(series->gyro, "gyro", imu.name, series->interval_s, result.gyro);
+    if (done)
+        done = noise_of(series->accel, "accelerometer", imu.name, series->interval_s, result.accel);
     if (!done) return Unexpected(done.error());
     return result;
 }
@@ -354,6 +303,12 @@ std::optional<Measured> walk_of(const std::array<AxisNoise, 3>& axes) {
     return Measured{value, std::sqrt(weighted) / value};
 }
 
+bool is_smooth(const AllanResult& result) {
+    const auto smooth = [](const AxisNoise& axis) { return axis.smooth; };
+    return std::any_of(result.gyro.begin(), result.gyro.end(), smooth) ||
+           std::any_of(result.accel.begin(), result.accel.end(), smooth);
+}
+
 double walk_needs_s(const AllanResult& result) {
     double longest = 0;
     for (const auto* axes : {&result.gyro, &result.accel})
@@ -363,6 +318,12 @@ double walk_needs_s(const AllanResult& result) {
 }
 
 Expected<std::string> kalibr_imu_yaml(const AllanResult& result, const std::string& topic) {
+    if (is_smooth(result))
+        return failure(
+            result.name,
+            "its bias changes too smoothly for a random walk, as with a temperature: that "
+            "walk is not known",
+            "record again at a constant temperature, after it has warmed up");
     const auto gyro_walk = walk_of(result.gyro);
     const auto accel_walk = walk_of(result.accel);
     if (!gyro_walk || !accel_walk)

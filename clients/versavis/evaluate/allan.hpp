@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/bias_history.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 
@@ -34,15 +35,19 @@ struct Measured {
 
 /// Of one axis. Units: u is rad/s of a gyro, m/s^2 of an accelerometer.
 struct AxisNoise {
-    Measured density;              ///< white noise, u / sqrt(Hz)
-    std::optional<Measured> walk;  ///< of the bias, u / s / sqrt(Hz); none: not seen
-    double walk_limit = 0;         ///< it is below this, at two standard deviations
-    double walk_needs_s = 0;       ///< how long a recording shows it, if it is at the limit
-    double flicker = 0;            ///< bias instability, u: the floor between both slopes
-    std::vector<AllanPoint> points;
+    Measured density;                ///< white noise, u / sqrt(Hz)
+    std::optional<Measured> walk;    ///< of the bias, u / s / sqrt(Hz); none: not seen
+    double walk_limit = 0;           ///< it is below this, at two standard deviations
+    double walk_needs_s = 0;         ///< how long a recording shows it, if it is at the limit
+    double flicker = 0;              ///< bias instability, u: the floor between both slopes
+    double white_from_s = 0;         ///< averaging time from which on the noise is white
+    std::optional<BiasDrift> drift;  ///< that was taken off before
+    bool smooth = false;  ///< the bias changes as no random walk does, which is not known then
+    std::vector<AllanPoint> points;  ///< without the drift
 };
 
-/// Errors: too short for white noise, or none is there.
+/// A drift of the bias is found and taken off (see bias_history()). Errors: too short for white
+/// noise, or none is there.
 Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s);
 
 /// What an IMU measured at rest.
@@ -57,17 +62,21 @@ struct AllanResult {
     std::string name;
     double rate_hz = 0;
     double duration_s = 0;
-    std::uint64_t missing = 0;  ///< samples that were interpolated
+    std::uint64_t missing = 0;  ///< samples that were filled in
+    std::uint64_t spikes = 0;   ///< values that were replaced
     std::array<AxisNoise, 3> gyro;
     std::array<AxisNoise, 3> accel;
 };
 
-/// Errors: too short; too many samples missing; it was moved, and when.
+/// Errors: too short; too many samples missing, or spikes; it was moved, and when.
 Expected<AllanResult> evaluate_allan(const RestingImu& imu);
 
 /// Of the three axes together: the root of their mean square. None: not seen at each axis.
 std::optional<Measured> walk_of(const std::array<AxisNoise, 3>& axes);
 Measured density_of(const std::array<AxisNoise, 3>& axes);
+
+/// The bias of an axis changes as no random walk does.
+bool is_smooth(const AllanResult& result);
 
 /// How long a recording would have to be to show all random walks.
 double walk_needs_s(const AllanResult& result);

@@ -194,7 +194,7 @@ Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
     evaluation.camera = *camera;
     evaluation.imu = *imu_name;
     const auto imu = read_imu(recording, *imu_name, settings.from_s, settings.to_s,
-                              [&] { return settings.watch(0); });
+                              Repeated::left_out, [&] { return settings.watch(0); });
     if (!imu) return Unexpected(imu.error());
     evaluation.filter_delay = imu->filter_delay;
     const auto rotations = Following(recording, settings, *imu, evaluation).run();

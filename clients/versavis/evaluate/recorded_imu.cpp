@@ -56,7 +56,7 @@ Expected<std::string> find_stream(const Recording& recording, ring::StreamKind k
 }
 
 Expected<RecordedImu> read_imu(const Recording& recording, const std::string& name, double from_s,
-                               double to_s, const GoOn& go_on) {
+                               double to_s, Repeated repeated, const GoOn& go_on) {
     const auto spans = spans_of(recording, name, go_on);
     if (!spans) return Unexpected(spans.error());
     const auto most = std::max_element(
@@ -78,11 +78,13 @@ Expected<RecordedImu> read_imu(const Recording& recording, const std::string& na
         }
         if (item.time < from || (to_s > 0 && item.time > to)) return !stopped;
         const bool faulty = (sample.flags & flag_sensor_error) != 0;
-        const bool repeated = (sample.flags & flag_repeated) != 0;
+        const bool repeats = (sample.flags & flag_repeated) != 0;
         imu.faulty += faulty ? 1U : 0U;
-        imu.repeated += repeated ? 1U : 0U;
+        imu.repeated += repeats ? 1U : 0U;
         const auto& times = imu.samples.times;
-        if (faulty || repeated || (!times.empty() && item.time <= times.back())) return !stopped;
+        if (faulty || (repeats && repeated == Repeated::left_out) ||
+            (!times.empty() && item.time <= times.back()))
+            return !stopped;
         imu.samples.times.push_back(item.time);
         for (std::size_t i = 0; i < 3; ++i) {
             imu.samples.gyro[i].push_back(sample.gyro[i]);

@@ -22,16 +22,19 @@ struct RecordedImu {
     Duration filter_delay;        ///< already subtracted from the times
     std::uint64_t elsewhere = 0;  ///< samples of other epochs
     std::uint64_t faulty = 0;     ///< the sensor itself reported an error
-    std::uint64_t repeated = 0;   ///< left out: they say nothing new
+    std::uint64_t repeated = 0;   ///< with the data of the one before
 };
 
 /// The only stream of a kind, or that of this name. Errors: no such stream; none, or several.
 Expected<std::string> find_stream(const Recording& recording, ring::StreamKind kind,
                                   const std::string& name);
 
+/// Samples that repeat the one before: an even series needs them, but they measure nothing new.
+enum class Repeated { kept, left_out };
+
 /// `from_s` and `to_s`: since the first sample; to 0: all. Errors: no sample in there, the file is
 /// damaged, stopped.
 Expected<RecordedImu> read_imu(const Recording& recording, const std::string& name, double from_s,
-                               double to_s, const GoOn& go_on);
+                               double to_s, Repeated repeated, const GoOn& go_on);
 
 }  // namespace versavis::client
