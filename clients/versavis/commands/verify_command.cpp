@@ -9,6 +9,7 @@
 
 #include "base/fail.hpp"
 #include "posix/file.hpp"
+#include "verify/signature.hpp"
 #include "verify/verification.hpp"
 
 namespace versavis::client {
@@ -33,31 +34,64 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
       stop_(std::move(stop)) {
     command_->add_option("recordings", files_, "Recordings (versavis record)")->required();
     command_->add_flag("--json", json_, "Print one JSON object for each recording");
-    command_->add_option("--html", html_, "Write a report with time lines to this file");
+    auto* html =
+        command_->add_option("--html", html_, "Write a report with time lines to this file");
+    auto* sign = command_->add_option(
+        "--sign", key_,
+        "Write FILE.verdict.json and its signature by this Ed25519 key, FILE.verdict.sig");
+    command_
+        ->add_option("--signed-by", public_key_,
+                     "Verify nothing: print the verdict that was signed by the owner of this "
+                     "public key, if it and the recording are unchanged")
+        ->excludes(html)
+        ->excludes(sign);
 }
 
 bool VerifyCommand::chosen() const { return command_->parsed(); }
 
 /// 0: all is proved; 1: something is not to be trusted; 2: something is plausible only. A recording
 /// that cannot be read does not keep the others from being verified.
-int VerifyCommand::run() const {
+int VerifyCommand::run() const { return public_key_.empty() ? verify_files() : check_signatures(); }
+
+int VerifyCommand::verify_files() const {
     if (!html_.empty() && files_.size() > 1)
         return fail({"--html", "a report is about one recording", "name one recording"}, EX_USAGE);
     Grade worst = Grade::proved;
     int unread = EX_OK;
+    const auto go_on = [this] { return !stop_(); };
     for (const std::string& file : files_) {
-        const auto verification = verify_recording(file, [this] { return !stop_(); });
+        const auto verification = verify_recording(file, go_on);
         if (!verification) {
             unread = fail(verification.error());
             continue;
         }
         fmt::print("{}", json_ ? to_json(*verification).dump() + "\n" : to_text(*verification));
         worst = std::min(worst, verification->grade());
+        if (!key_.empty())
+            if (const auto written = sign_verdict(file, *verification, key_, go_on); !written)
+                return fail(written.error(), EX_CANTCREAT);
         if (html_.empty()) continue;
         if (const auto written = write_whole_file(html_, to_html(*verification)); !written)
             return fail(written.error(), EX_CANTCREAT);
     }
     return unread == EX_OK ? exit_code(worst) : unread;
+}
+
+int VerifyCommand::check_signatures() const {
+    Grade worst = Grade::proved;
+    for (const std::string& file : files_) {
+        const auto verdict = signed_verdict(file, public_key_, [this] { return !stop_(); });
+        if (!verdict) return fail(verdict.error());
+        if (verdict->forged) return fail(*verdict->forged, exit_code(Grade::untrusted));
+        const nlohmann::json& found = verdict->verification;
+        const std::string grade = found.value("verdict", "");
+        fmt::print("{}", json_ ? found.dump() + "\n"
+                               : fmt::format("{}: unchanged since it was signed: {}\n{}\n", file,
+                                             grade, found.value("sentence", "")));
+        for (const Grade one : {Grade::untrusted, Grade::plausible})
+            if (grade == to_string(one)) worst = std::min(worst, one);
+    }
+    return exit_code(worst);
 }
 
 }  // namespace versavis::client

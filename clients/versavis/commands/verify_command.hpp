@@ -20,10 +20,15 @@ class VerifyCommand {
     int run() const;
 
  private:
+    int verify_files() const;
+    int check_signatures() const;
+
     CLI::App* command_;
     std::function<bool()> stop_;
     std::vector<std::string> files_;
     std::string html_;
+    std::string key_;
+    std::string public_key_;
     bool json_ = false;
 };
 
