@@ -5,6 +5,9 @@
 #include <cmath>
 #include <random>
 
+#include "evaluate/picture_offsets.hpp"
+#include "verify/picture_judge.hpp"
+
 using namespace versavis;
 using namespace versavis::client;
 using Catch::Contains;
@@ -294,4 +297,56 @@ TEST_CASE("rotation_offset: an offset out of range or too little data is reporte
     far.offset_s = 0.3;
     const Seen other = OffsetSimulation(far, 5).run();
     CHECK_FALSE(rotation_offset(other.frames, other.gyro, {milliseconds(100)}));
+}
+
+namespace {
+
+/// Three minutes of frames whose stamps are later by this from the second one on.
+PictureEvidence drive_with_step(Duration step, unsigned seed) {
+    MovingWorld world;
+    world.seconds = 181;
+    world.camera_sigma = 1e-3;
+    Seen seen = OffsetSimulation(world, seed).run();
+    for (FrameRotation& frame : seen.frames)
+        if (frame.from >= output_at(121)) {
+            frame.from = frame.from + step;
+            frame.to = frame.to + step;
+        }
+    return {picture_offsets({seen.frames, seen.gyro}), {}};
+}
+
+}  // namespace
+
+TEST_CASE("picture_offsets: a step of the stamps against the pictures is found where it is") {
+    const Duration step = GENERATE(milliseconds(1), -milliseconds(1), milliseconds(10));
+    const PictureEvidence evidence = drive_with_step(step, 7);
+    REQUIRE(evidence.offsets.size() == 9);
+    const PictureJudge judge(evidence);
+    REQUIRE(judge.usual());
+    CHECK(absolute(judge.usual()->offset - microseconds(12'300)) < microseconds(300));
+    CHECK_FALSE(judge.off(output_at(50)));
+    const auto off = judge.off(output_at(150));
+    REQUIRE(off);
+    CHECK(absolute(*off + step) < microseconds(300));
+}
+
+TEST_CASE("picture_offsets: honest stamps are not doubted, and a wrong calibration is named") {
+    for (unsigned seed = 0; seed < 10; ++seed) {
+        PictureEvidence evidence = drive_with_step({}, seed);
+        for (int s = 1; s < 181; ++s) CHECK_FALSE(PictureJudge(evidence).off(output_at(s)));
+        evidence.calibrated = microseconds(12'300);
+        CHECK_FALSE(PictureJudge(evidence).off(output_at(50)));
+        evidence.calibrated = milliseconds(8);
+        CHECK(PictureJudge(evidence).off(output_at(50)));
+    }
+}
+
+TEST_CASE("picture_offsets: at rest nothing is compared, and nothing is doubted") {
+    MovingWorld world;
+    world.seconds = 100;
+    world.rate_rms = 1e-4;
+    const Seen seen = OffsetSimulation(world, 1).run();
+    const PictureEvidence evidence{picture_offsets({seen.frames, seen.gyro}), {}};
+    CHECK(evidence.offsets.empty());
+    CHECK_FALSE(PictureJudge(evidence).off(output_at(50)));
 }

@@ -36,6 +36,18 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
     command_->add_flag("--json", json_, "Print one JSON object for each recording");
     auto* html =
         command_->add_option("--html", html_, "Write a report with time lines to this file");
+    auto* pictures = command_->add_flag(
+        "--pictures", compare_pictures_,
+        "Compare the rotation of the pictures with the gyro, too: reads all pixels");
+    command_->add_option("--imu", pictures_.imu, "The IMU to compare with, if there are several")
+        ->needs(pictures);
+    command_
+        ->add_option("--calibration", pictures_.calibration,
+                     "Kalibr's camchain.yaml (default: the recording's attachment)")
+        ->needs(pictures);
+    command_
+        ->add_option("--focal", pictures_.focal, "Focal length in pixels, instead of a calibration")
+        ->needs(pictures);
     auto* sign = command_->add_option(
         "--sign", key_,
         "Write FILE.verdict.json and its signature by this Ed25519 key, FILE.verdict.sig");
@@ -60,7 +72,9 @@ int VerifyCommand::verify_files() const {
     int unread = EX_OK;
     const auto go_on = [this] { return !stop_(); };
     for (const std::string& file : files_) {
-        const auto verification = verify_recording(file, go_on);
+        const auto verification = verify_recording(
+            file, go_on,
+            compare_pictures_ ? pictures_of(file) : std::map<std::string, PictureEvidence>());
         if (!verification) {
             unread = fail(verification.error());
             continue;
@@ -75,6 +89,20 @@ int VerifyCommand::verify_files() const {
             return fail(written.error(), EX_CANTCREAT);
     }
     return unread == EX_OK ? exit_code(worst) : unread;
+}
+
+std::map<std::string, PictureEvidence> VerifyCommand::pictures_of(const std::string& file) const {
+    std::map<std::string, PictureEvidence> found;
+    const auto recording = Recording::open(file);
+    if (!recording) return found;  // verify_recording() says why
+    for (const RecordedStream& stream : recording->streams()) {
+        if (stream.kind != ring::StreamKind::frames) continue;
+        ImuEvaluationSettings settings = pictures_;
+        settings.camera = stream.name;
+        settings.watch = [this](std::size_t /*frames*/) { return !stop_(); };
+        found[stream.name] = compare_pictures(*recording, settings);
+    }
+    return found;
 }
 
 int VerifyCommand::check_signatures() const {

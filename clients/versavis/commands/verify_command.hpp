@@ -4,8 +4,11 @@
 
 #include <CLI/App.hpp>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
+
+#include "evaluate/picture_offsets.hpp"
 
 namespace versavis::client {
 
@@ -21,12 +24,15 @@ class VerifyCommand {
 
  private:
     int verify_files() const;
+    std::map<std::string, PictureEvidence> pictures_of(const std::string& file) const;
     int check_signatures() const;
 
     CLI::App* command_;
     std::function<bool()> stop_;
     std::vector<std::string> files_;
     std::string html_;
+    ImuEvaluationSettings pictures_;
+    bool compare_pictures_ = false;
     std::string key_;
     std::string public_key_;
     bool json_ = false;

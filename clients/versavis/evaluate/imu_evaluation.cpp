@@ -184,9 +184,8 @@ Expected<CameraModel> camera_model(const Recording& recording,
     return model_of(*camera, where);
 }
 
-Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
-                                     const ImuEvaluationSettings& settings) {
-    ImuEvaluation evaluation;
+Expected<SeenMotion> seen_motion(const Recording& recording, const ImuEvaluationSettings& settings,
+                                 ImuEvaluation& evaluation) {
     const auto camera = find_stream(recording, ring::StreamKind::frames, settings.camera);
     if (!camera) return Unexpected(camera.error());
     const auto imu_name = find_stream(recording, ring::StreamKind::imu, settings.imu);
@@ -197,10 +196,18 @@ Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
                               Repeated::left_out, [&] { return settings.watch(0); });
     if (!imu) return Unexpected(imu.error());
     evaluation.filter_delay = imu->filter_delay;
-    const auto rotations = Following(recording, settings, *imu, evaluation).run();
+    auto rotations = Following(recording, settings, *imu, evaluation).run();
     if (!rotations) return Unexpected(rotations.error());
     add_notes(*imu, evaluation);
-    auto found = rotation_offset(*rotations, gyro_of(*imu), {settings.range});
+    return SeenMotion{std::move(*rotations), gyro_of(*imu)};
+}
+
+Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
+                                     const ImuEvaluationSettings& settings) {
+    ImuEvaluation evaluation;
+    const auto motion = seen_motion(recording, settings, evaluation);
+    if (!motion) return Unexpected(motion.error());
+    auto found = rotation_offset(motion->rotations, motion->gyro, {settings.range});
     if (!found) return Unexpected(found.error());
     evaluation.found = std::move(*found);
     return evaluation;

@@ -42,6 +42,16 @@ Expected<CameraModel> camera_model(const Recording& recording,
                                    const ImuEvaluationSettings& settings,
                                    const FrameMetadata& frame, ImuEvaluation& evaluation);
 
+struct SeenMotion {
+    std::vector<FrameRotation> rotations;
+    std::vector<GyroSample> gyro;
+};
+
+/// Reads both, of the span in which the stamps of the IMU are continuous; all but
+/// `evaluation.found` is known then.
+Expected<SeenMotion> seen_motion(const Recording& recording, const ImuEvaluationSettings& settings,
+                                 ImuEvaluation& evaluation);
+
 Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
                                      const ImuEvaluationSettings& settings);
 

@@ -12,6 +12,7 @@
 
 #include "base/median.hpp"
 #include "verify/even_line.hpp"
+#include "verify/picture_judge.hpp"
 
 namespace versavis::client {
 
@@ -449,6 +450,7 @@ void CameraJudge::judge_translation() {
 
 StreamVerdict CameraJudge::finish(StreamOrder order) const {
     VerdictBuilder verdict(camera_.name, "camera");
+    const PictureJudge pictures(camera_.pictures);
     for (const Claim& claim : claims_) {
         const FrameMetadata& frame = claim.frame->frame;
         verdict.begin_item(order.second(frame.arrival), frame.sigma_ns);
@@ -458,6 +460,7 @@ StreamVerdict CameraJudge::finish(StreamOrder order) const {
             continue;
         }
         for (const auto& [finding, by] : claim.findings) verdict.add(finding, by);
+        if (const auto by = pictures.off(claim.frame->time)) verdict.add(Finding::pictures, *by);
         if (frame.stamp_kind() == StampKind::arrival) continue;
         clock_.judge({frame.board_time, frame.host_time, claim.frame->time, frame.sigma_ns,
                       frame.epoch, frame.flags},

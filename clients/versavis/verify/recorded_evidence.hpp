@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/picture_offset.hpp"
 #include "recording/recording.hpp"
 #include "verify/message_stamps.hpp"
 #include "versavis/error.hpp"
@@ -113,6 +114,7 @@ struct CameraEvidence {
     std::vector<StampedFrame> frames;
     std::vector<CameraRun> runs;
     std::vector<RecordedGap> gaps;
+    PictureEvidence pictures{};    ///< if they were compared with the gyro
     std::uint64_t impossible = 0;  ///< frames whose times no clock can have: left out
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "verify/verification.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 
@@ -8,6 +10,7 @@
 #include "verify/camera_judge.hpp"
 #include "verify/clock_witness.hpp"
 #include "verify/imu_judge.hpp"
+#include "verify/picture_judge.hpp"
 #include "verify/stream_order.hpp"
 
 namespace versavis::client {
@@ -23,6 +26,22 @@ HostTime begin_of(const RecordedEvidence& evidence) {
         if (!imu.samples.empty()) first.push_back(imu.samples.front().host);
     if (first.empty()) return {};
     return *std::min_element(first.begin(), first.end());
+}
+
+void note_pictures(const RecordedEvidence& evidence, Verification& verification) {
+    for (const CameraEvidence& camera : evidence.cameras) {
+        const PictureEvidence& pictures = camera.pictures;
+        if (!pictures.problem.empty())
+            verification.notes.push_back(
+                fmt::format("{}: pictures are not compared: {}", camera.name, pictures.problem));
+        const PictureJudge judge(pictures);
+        if (const auto& usual = judge.usual())
+            verification.notes.push_back(fmt::format(
+                "{}: by {} parts of its pictures, the IMU's stamps are {:+.3f} ms +- {:.3f} ms "
+                "later",
+                camera.name, pictures.offsets.size(), static_cast<double>(usual->offset.ns) * 1e-6,
+                static_cast<double>(usual->sigma.ns) * 1e-6));
+    }
 }
 
 }  // namespace
@@ -63,13 +82,17 @@ Verification verify(const RecordedEvidence& evidence) {
     return verification;
 }
 
-Expected<Verification> verify_recording(const std::string& path,
-                                        const std::function<bool()>& go_on) {
+Expected<Verification> verify_recording(const std::string& path, const std::function<bool()>& go_on,
+                                        const std::map<std::string, PictureEvidence>& pictures) {
     const auto recording = Recording::open(path);
     if (!recording) return Unexpected(recording.error());
-    const auto evidence = read_evidence(*recording, go_on);
+    auto evidence = read_evidence(*recording, go_on);
     if (!evidence) return Unexpected(evidence.error());
+    for (CameraEvidence& camera : evidence->cameras)
+        if (const auto found = pictures.find(camera.name); found != pictures.end())
+            camera.pictures = found->second;
     Verification verification = verify(*evidence);
+    note_pictures(*evidence, verification);
     verification.file = std::filesystem::path(path).filename().string();
     if (!recording->facts().defect.empty())
         verification.notes.push_back("the end of the file is missing: " +

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -33,9 +34,11 @@ struct Verification {
 
 Verification verify(const RecordedEvidence& evidence);
 
-/// Errors: the recording cannot be read or is damaged; stopped.
-Expected<Verification> verify_recording(const std::string& path,
-                                        const std::function<bool()>& go_on);
+/// `pictures`: of cameras whose pictures were compared with the gyro. Errors: the recording cannot
+/// be read or is damaged; stopped.
+Expected<Verification> verify_recording(
+    const std::string& path, const std::function<bool()>& go_on,
+    const std::map<std::string, PictureEvidence>& pictures = {});
 
 nlohmann::json to_json(const Verification& verification);
 std::string to_text(const Verification& verification);

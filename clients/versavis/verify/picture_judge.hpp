@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whether the pictures of a camera and its stamps belong together, by the rotation that both the
+// pictures and the gyro show.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/picture_offset.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::client {
+
+class PictureJudge {
+ public:
+    /// What a shutter and a filter delay is the same throughout: an offset counts that differs from
+    /// the others, or if all differ from the calibration.
+    explicit PictureJudge(const PictureEvidence& evidence);
+
+    /// By how much pictures and stamps differ there; none: they do not, or nothing shows it.
+    std::optional<Duration> off(OutputTime at) const;
+
+    /// Of all; none: too few to tell.
+    const std::optional<PictureOffset>& usual() const { return usual_; }
+
+ private:
+    const PictureEvidence& evidence_;
+    std::optional<PictureOffset> usual_;
+    Duration by_calibration_;  ///< all are off by this; 0: they are not
+};
+
+}  // namespace versavis::client
