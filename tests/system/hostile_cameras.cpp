@@ -112,8 +112,13 @@ TEST_CASE("hostile cameras: the end comes in time also right after one turned mu
     Stack stack({"muter", 155, 1, 20, "", hostile_fault("camera_mute", 40, "seconds = 1000"), ""});
     stack.start_rig();
     stack.start_service();
-    stack.wait_for_status(
-        [](const auto& s) { return s["cameras"][0]["frames_received"].template get<int>() >= 38; });
+    // A busy host may miss some of its 40 frames.
+    stack.wait_for_status([](const auto& s) {
+        const auto& camera = s["cameras"][0];
+        const auto received = camera["frames_received"].template get<int>();
+        return received >= 38 ||
+               (received > 0 && (camera["state"] == "silent" || camera["state"] == "absent"));
+    });
     CHECK(time_to_end(stack.service()) < soon);
 }
 

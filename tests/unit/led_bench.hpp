@@ -2,6 +2,7 @@
 // A camera that looks at the rig's LED timing board, without service and clocks.
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 
 #include "camera_view.hpp"
@@ -18,6 +19,7 @@ struct LedBenchSettings {
     bool backward = false;
     bool high_bit_first = false;
     bool moving = true;
+    double texture = 0;  ///< grey levels of a pattern that lies over everything, and stays
 };
 
 class LedBench {
@@ -40,6 +42,7 @@ class LedBench {
         surroundings_.leds->settle(end);
         std::vector<std::uint8_t> out(std::size_t{width} * height);
         view_.paint(start, end, ++serial_, out);
+        add_texture(out);
         std::vector<std::byte> bytes(out.size());
         std::memcpy(bytes.data(), out.data(), out.size());
         return bytes;
@@ -64,6 +67,20 @@ class LedBench {
     }
 
  private:
+    /// Blocks of five pixels, each of a brightness of its own.
+    void add_texture(std::vector<std::uint8_t>& out) const {
+        if (settings_.texture <= 0) return;
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x) {
+                const std::uint32_t hash =
+                    (x / 5 * 73'856'093U ^ y / 5 * 19'349'663U) * 2654435761U;
+                const double share = static_cast<double>(hash >> 24U) / 255;
+                std::uint8_t& pixel = out[std::size_t{y} * width + x];
+                pixel =
+                    static_cast<std::uint8_t>(std::min(255.0, pixel + settings_.texture * share));
+            }
+    }
+
     /// The first step, to count 1, comes after one period.
     HostTime step_time(std::int64_t step) const {
         return HostTime{std::llround(static_cast<double>(step) * 1e9 / settings_.rate_hz)};

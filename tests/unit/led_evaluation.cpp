@@ -87,6 +87,35 @@ TEST_CASE("led_evaluation: from pixels to the offset, within 5 us", "[statistics
     CHECK(report->pairs.at(0).interval_us < 5);
 }
 
+TEST_CASE("led_evaluation: what lies behind the LEDs does not move the offset", "[statistics]") {
+    const double texture = GENERATE(15.0, 40.0);
+    const double led_level = GENERATE(160.0, 40.0);
+    const Duration late = GENERATE(microseconds(0), microseconds(120));
+    auto first = bench_settings(970, {40, 150, 280, 165});
+    auto second = bench_settings(970, {240, 60, 70, 30});
+    second.texture = texture;
+    second.led_level = led_level;
+    std::vector<LedCamera> cameras;
+    cameras.push_back({"cam0", bench(first), {}});
+    cameras.push_back({"cam1", bench(second), late});
+    LedEvaluationSettings settings;
+    settings.report.rate_hz = 970;
+    settings.places = {{"cam0", {40, 150, 280, 165}}, {"cam1", {240, 60, 70, 30}}};
+    const auto report = evaluate(cameras, 200, settings);
+    CAPTURE(texture, led_level, late.ns);
+    REQUIRE(report);
+    INFO(to_text(*report));
+    const LedPairReport& pair = report->pairs.at(0);
+    CHECK(pair.mismatches == 0);
+    if (texture >= led_level) {  // nothing is read, and nothing is claimed
+        CHECK(pair.matches == 0);
+        return;
+    }
+    CHECK(pair.matches > 150);
+    const double error = pair.offset_us - static_cast<double>(late.ns) * 1e-3;
+    CHECK(std::abs(error) < 1 + 1.5 * pair.interval_us);
+}
+
 TEST_CASE("led_evaluation: a camera without the board is left out, unless it was asked for") {
     std::vector<LedCamera> cameras;
     cameras.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});

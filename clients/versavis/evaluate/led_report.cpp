@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "base/median.hpp"
+#include "evaluate/led_calibration.hpp"
 
 namespace versavis::client {
 
@@ -153,7 +154,7 @@ std::optional<Line> fit_line(const std::vector<LedObservation>& shots,
 }
 
 struct Camera {
-    const std::vector<LedObservation>* shots = nullptr;
+    std::vector<LedObservation> shots;
     std::vector<Read> reads;
     LedLayout layout;
 };
@@ -162,9 +163,9 @@ LedCameraReport report_camera(const std::string& name, const Camera& camera, dou
     LedCameraReport report;
     report.name = name;
     report.binary_first = camera.layout.binary_first;
-    report.pictures = camera.shots->size();
-    for (std::size_t i = 0; i < camera.shots->size(); ++i) {
-        const LedObservation& shot = (*camera.shots)[i];
+    report.pictures = camera.shots.size();
+    for (std::size_t i = 0; i < camera.shots.size(); ++i) {
+        const LedObservation& shot = camera.shots[i];
         const Read& read = camera.reads[i];
         if (!readable(shot, rate_hz))
             ++report.too_long;
@@ -177,10 +178,10 @@ LedCameraReport report_camera(const std::string& name, const Camera& camera, dou
         if (read.split) ++report.split;
         if (!shot.triggered) ++report.untriggered;
     }
-    const Increments counted = increments(*camera.shots, camera.reads, rate_hz);
+    const Increments counted = increments(camera.shots, camera.reads, rate_hz);
     report.increments = counted.all;
     report.wrong_increments = counted.wrong;
-    if (const auto line = fit_line(*camera.shots, camera.reads, rate_hz)) {
+    if (const auto line = fit_line(camera.shots, camera.reads, rate_hz)) {
         report.rate_hz = line->rate_hz;
         report.scatter_us = line->scatter_s * 1e6;
     }
@@ -215,15 +216,15 @@ LedPairReport report_pair(const std::string& first, const Camera& a, const std::
     const auto key = [](const LedObservation& shot) {
         return std::pair(shot.life, std::pair(shot.epoch, shot.tick));
     };
-    for (std::size_t i = 0; i < b.shots->size(); ++i)
-        if ((*b.shots)[i].triggered) of_tick[key((*b.shots)[i])] = i;
-    for (std::size_t i = 0; i < a.shots->size(); ++i) {
-        if (!(*a.shots)[i].triggered) continue;
-        const auto found = of_tick.find(key((*a.shots)[i]));
+    for (std::size_t i = 0; i < b.shots.size(); ++i)
+        if (b.shots[i].triggered) of_tick[key(b.shots[i])] = i;
+    for (std::size_t i = 0; i < a.shots.size(); ++i) {
+        if (!a.shots[i].triggered) continue;
+        const auto found = of_tick.find(key(a.shots[i]));
         if (found == of_tick.end()) continue;
-        const LedObservation& shot_b = (*b.shots)[found->second];
+        const LedObservation& shot_b = b.shots[found->second];
         const Read& read_b = b.reads[found->second];
-        const bool seen = (*a.shots)[i].picture.state != LedState::hidden &&
+        const bool seen = a.shots[i].picture.state != LedState::hidden &&
                           shot_b.picture.state != LedState::hidden;
         if (!seen) continue;
         ++report.pairs;
@@ -231,7 +232,7 @@ LedPairReport report_pair(const std::string& first, const Camera& a, const std::
             ++report.ambiguous;
             continue;
         }
-        const double off = excess((*a.shots)[i], a.reads[i], shot_b, read_b, rate_hz);
+        const double off = excess(a.shots[i], a.reads[i], shot_b, read_b, rate_hz);
         const bool halved = std::min(a.reads[i].reading.period, read_b.reading.period) < led_period;
         if (std::abs(off) < half_step && halved) ++report.modulo_32;
         if (std::abs(off) < half_step)
@@ -262,7 +263,7 @@ std::vector<std::string> fitting_layouts(const std::map<std::string, Camera>& ca
             for (const auto& [name, camera] : cameras) {
                 layout.binary_first = camera.layout.binary_first;
                 const Increments some =
-                    increments(*camera.shots, read_all(*camera.shots, rate_hz, layout), rate_hz);
+                    increments(camera.shots, read_all(camera.shots, rate_hz, layout), rate_hz);
                 sum.all += some.all;
                 sum.wrong += some.wrong;
             }
@@ -286,7 +287,7 @@ std::optional<double> period_s(const std::vector<LedObservation>& shots) {
 /// A service that is wrong by whole pictures shows the same counts again after some of them.
 void note_blind_spots(LedReport& report, const std::map<std::string, Camera>& cameras) {
     for (const auto& [name, camera] : cameras) {
-        const auto period = period_s(*camera.shots);
+        const auto period = period_s(camera.shots);
         if (!period || *period <= 0) continue;
         const double steps = *period * report.rate_hz;
         const auto whole = std::llround(steps);
@@ -373,7 +374,7 @@ Error nothing_read(const LedReport& report) {
                             most_led_steps * 1e6 / report.rate_hz)};
     if (hidden >= ambiguous)
         return {"", counts, "give the positions of the outermost LEDs: --board CAMERA=X1,Y1,X2,Y2"};
-    return {"", counts, "see man versavis-evaluate for the board that is expected"};
+    return {"", counts, "docs/user/evaluate.md shows the board that is expected"};
 }
 
 }  // namespace
@@ -398,12 +399,13 @@ Expected<LedReport> led_report(const LedObservations& shots, const LedReportSett
     report.rate_hz = settings.rate_hz;
     std::map<std::string, Camera> cameras;
     for (const auto& [name, of_camera] : shots) {
-        Camera camera{&of_camera, {}, settings.layout};
+        Camera camera{{}, {}, settings.layout};
         const auto known = settings.binary_first.find(name);
         camera.layout.binary_first = known != settings.binary_first.end()
                                          ? known->second
                                          : binary_first(of_camera, report.rate_hz, camera.layout);
-        camera.reads = read_all(of_camera, report.rate_hz, camera.layout);
+        camera.shots = calibrated_leds(of_camera, report.rate_hz, camera.layout);
+        camera.reads = read_all(camera.shots, report.rate_hz, camera.layout);
         report.cameras.push_back(report_camera(name, camera, report.rate_hz));
         cameras.emplace(name, std::move(camera));
     }

@@ -30,8 +30,8 @@ std::vector<PictureOffset> picture_offsets(const SeenMotion& motion) {
         for (; frame != motion.rotations.end() && frame->to <= to; ++frame)
             if (frame->from >= from) rotations.push_back(*frame);
         std::vector<GyroSample> gyro;
-        while (sample != motion.gyro.end() && sample->time < from - 2 * offset_range) ++sample;
-        for (auto one = sample; one != motion.gyro.end() && one->time < to + 2 * offset_range;
+        while (sample != motion.gyro.end() && sample->time < from - offset_range * 2) ++sample;
+        for (auto one = sample; one != motion.gyro.end() && one->time < to + offset_range * 2;
              ++one)
             gyro.push_back(*one);
         const auto found = rotation_offset(rotations, gyro, {offset_range});
