@@ -31,7 +31,8 @@ constexpr std::array<std::uint8_t, 12> public_prefix{0x30, 0x2a, 0x30, 0x05, 0x0
                                                      0x2b, 0x65, 0x70, 0x03, 0x21, 0x00};
 
 using Key = std::array<std::uint8_t, 32>;
-static_assert(sizeof(Key) == crypto_sign_SEEDBYTES && sizeof(Key) == crypto_sign_PUBLICKEYBYTES);
+static_assert(sizeof(Key) == crypto_sign_SEEDBYTES);
+static_assert(sizeof(Key) == crypto_sign_PUBLICKEYBYTES);
 
 constexpr std::size_t read_size = 1U << 20U;
 
