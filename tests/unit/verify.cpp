@@ -389,6 +389,34 @@ TEST_CASE("verify: a camera whose clock is set still proves its frames") {
     CHECK(untrusted_items(verdict_of(verification, "cam0")) < 5);
 }
 
+TEST_CASE("verify: a camera that takes a frame of its own still proves the others") {
+    Drive drive;
+    for (auto& arrival : drive.camera(0).runs[0].arrivals)
+        if (arrival.block_id >= 1200) ++arrival.block_id;
+    for (auto& each : drive.frames(0))
+        if (each.frame.block_id >= 1200) ++each.frame.block_id;
+    const Verification verification = verify(drive.evidence());
+    INFO(to_text(verification));
+    CHECK(verdict_of(verification, "cam0").grade() == Grade::proved);
+}
+
+TEST_CASE("verify: a recording that begins and ends between a frame and its evidence") {
+    Drive drive;
+    CameraRun& run = drive.camera(0).runs[0];
+    const std::uint64_t first = drive.frames(0)[3].frame.trigger;
+    const std::uint64_t last = drive.frames(0)[drive.frames(0).size() - 4].frame.block_id;
+    std::erase_if(run.exposures, [&](const auto& each) { return each.trigger < first; });
+    std::erase_if(run.arrivals, [&](const auto& each) { return each.block_id > last; });
+    const Verification verification = verify(drive.evidence());
+    INFO(to_text(verification));
+    const StreamVerdict& verdict = verdict_of(verification, "cam0");
+    CHECK(untrusted_items(verdict) == 0);
+    std::uint64_t without = 0;
+    for (const FindingSpan& span : verdict.findings)
+        if (span.finding == Finding::no_record) without += span.items;
+    CHECK(without == 6);
+}
+
 TEST_CASE("verify: suspect items are withheld, and are not judged") {
     Drive drive;
     for (std::size_t i = 0; i < 10; ++i) {

@@ -21,6 +21,9 @@ namespace {
 /// What the same instant may differ by in two places: same_instant, when delays are subtracted.
 constexpr Duration same_instant = microseconds(1);
 
+/// Frame and evidence of an exposure are recorded within this.
+constexpr Duration latest_evidence = seconds(1);
+
 /// A camera may state another length than its line shows, always by the same amount. What differs
 /// from that by more is another exposure.
 constexpr Duration length_tolerance = microseconds(200);
@@ -78,7 +81,8 @@ struct Claim {
     const ArrivalEvidence* arrival = nullptr;
     bool other_arrival = false;  ///< found by its block id only
     const ExposureEvidence* exposure = nullptr;
-    std::vector<std::pair<Finding, Duration>> findings;
+    bool cut_off = false;  ///< its evidence may lie before the recording, or after it
+    std::vector<std::pair<Finding, Duration>> findings{};
 
     bool judged() const { return (frame->frame.flags & flag_suspect) == 0; }
     void add(Finding finding, Duration by = {}) { findings.emplace_back(finding, by); }
@@ -90,6 +94,7 @@ class CameraJudge {
         : camera_(camera), clock_(clock) {
         for (const CameraRun& run : camera.runs) runs_.emplace_back(run);
         find_arrivals();
+        find_cut_off();
         for (Claim& claim : claims_)
             if (claim.judged()) judge_alone(claim);
         for (std::size_t run = 0; run < runs_.size(); ++run) judge_run(run);
@@ -100,6 +105,7 @@ class CameraJudge {
 
  private:
     void find_arrivals();
+    void find_cut_off();
     void judge_alone(Claim& claim) const;
     void judge_exposure(Claim& claim) const;
     void judge_run(std::size_t run);
@@ -124,7 +130,7 @@ void CameraJudge::find_arrivals() {
             known[{arrivals[i].block_id, arrivals[i].arrived.ns}] = {run, i};
     }
     for (const StampedFrame& each : camera_.frames) {
-        Claim& claim = claims_.emplace_back(Claim{&each, 0, nullptr, false, nullptr, {}});
+        Claim& claim = claims_.emplace_back(Claim{&each});
         constexpr Duration apart = seconds(10);
         const HostTime arrived = each.frame.arrival;
         auto found = known.lower_bound({each.frame.block_id, arrived.ns});
@@ -144,6 +150,20 @@ void CameraJudge::find_arrivals() {
     }
 }
 
+/// A recording may begin and end between a frame and its evidence, as the parts of a split one do.
+void CameraJudge::find_cut_off() {
+    const auto mark = [](auto first, auto end) {
+        for (auto claim = first; claim != end; ++claim) {
+            const bool whole = claim->arrival != nullptr && claim->exposure != nullptr;
+            const Duration away = claim->frame->frame.arrival - first->frame->frame.arrival;
+            if (whole || absolute(away) > latest_evidence) return;
+            claim->cut_off = true;
+        }
+    };
+    mark(claims_.begin(), claims_.end());
+    mark(claims_.rbegin(), claims_.rend());
+}
+
 std::optional<ClockBounds::Interval> CameraJudge::on_host(BoardTime board, HostTime about) const {
     const ClockBounds* life = clock_.life(board, about);
     return life == nullptr ? std::nullopt : life->at(board);
@@ -156,7 +176,7 @@ void CameraJudge::judge_alone(Claim& claim) const {
         return;
     }
     if (claim.arrival == nullptr) {
-        claim.add(Finding::no_arrival);
+        claim.add(claim.cut_off ? Finding::no_record : Finding::no_arrival);
         return;
     }
     if (claim.other_arrival)
@@ -174,7 +194,7 @@ void CameraJudge::judge_alone(Claim& claim) const {
 void CameraJudge::judge_exposure(Claim& claim) const {
     const FrameMetadata& frame = claim.frame->frame;
     if (claim.exposure == nullptr) {
-        claim.add(Finding::no_exposure);
+        claim.add(claim.cut_off ? Finding::no_record : Finding::no_exposure);
         return;
     }
     const ExposureEvidence& exposure = *claim.exposure;
@@ -210,13 +230,16 @@ void CameraJudge::judge_run(std::size_t run) {
     for (Claim* claim : claims) claim->add(Finding::no_start);
 }
 
-/// A camera numbers every trigger, or those that it took.
+/// A camera numbers every trigger, or those that it took. It may also take frames of its own, which
+/// only its clock tells from frames of later triggers.
 void CameraJudge::judge_steps(const std::vector<Claim*>& claims) const {
     for (std::size_t i = 1; i < claims.size(); ++i) {
         const FrameMetadata& last = claims[i - 1]->frame->frame;
         const FrameMetadata& frame = claims[i]->frame->frame;
-        if (frame.block_id <= last.block_id ||
-            frame.block_id - last.block_id > frame.trigger - last.trigger)
+        const bool by_clock =
+            claims[i - 1]->arrival->camera.ns != 0 && claims[i]->arrival->camera.ns != 0;
+        const bool more = frame.block_id - last.block_id > frame.trigger - last.trigger;
+        if (frame.block_id <= last.block_id || (more && !by_clock))
             claims[i]->add(Finding::block_step);
     }
 }
