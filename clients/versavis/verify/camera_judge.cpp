@@ -86,6 +86,9 @@ struct Claim {
 
     bool judged() const { return (frame->frame.flags & flag_suspect) == 0; }
     void add(Finding finding, Duration by = {}) { findings.emplace_back(finding, by); }
+    void withdraw(Finding finding) {
+        std::erase_if(findings, [&](const auto& one) { return one.first == finding; });
+    }
 };
 
 class CameraJudge {
@@ -299,6 +302,7 @@ class ClockFollower {
 
     /// How far the point lies off; none: not so far that it is of another exposure.
     std::optional<Duration> off(const Point& point) {
+        set_anew_ = false;
         if (good_.empty()) {
             accept(point);
             return std::nullopt;
@@ -318,12 +322,16 @@ class ClockFollower {
         const Duration later = point.latency - usual_latency();
         set_ = absolute(later - off) > absolute(off) / 2 ? set_ + 1 : 0;
         if (set_ < frames_to_believe) return off;
+        set_anew_ = true;
         good_.clear();
         drift_ = 0;
         drift_error_ = unknown_drift;
         accept(point);
         return std::nullopt;
     }
+
+    /// By the newest point and those before it that were off, the camera's clock was set.
+    bool set_anew() const { return set_anew_; }
 
  private:
     static constexpr std::size_t remembered = 64;
@@ -360,6 +368,7 @@ class ClockFollower {
     double drift_error_ = unknown_drift;
     std::size_t accepted_ = 0;
     int set_ = 0;  ///< points in a row by which the camera's clock was set
+    bool set_anew_ = false;
 };
 
 void CameraJudge::judge_camera_clock(const std::vector<Claim*>& claims) const {
@@ -373,14 +382,24 @@ void CameraJudge::judge_camera_clock(const std::vector<Claim*>& claims) const {
     }
     const int halves = stamped_instant(claims);
     ClockFollower follower;
+    std::vector<std::pair<Claim*, Duration>> doubted;  // in a row
     for (Claim* claim : claims) {
         const FrameMetadata& frame = claim->frame->frame;
         const BoardTime at = instant_of(*claim->exposure, halves);
         const HostTime end = frame.host_time + (claim->exposure->end - frame.board_time);
-        const auto off =
-            follower.off({at, Duration{claim->arrival->camera.ns - at.ns},
-                          claim->arrival->arrived - end, runs_[claim->run].gap(frame.trigger)});
-        if (off) claim->add(Finding::camera_clock, *off);
+        const ClockFollower::Point point{at, Duration{claim->arrival->camera.ns - at.ns},
+                                         claim->arrival->arrived - end,
+                                         runs_[claim->run].gap(frame.trigger)};
+        if (const auto off = follower.off(point)) {
+            claim->add(Finding::camera_clock, *off);
+            doubted.emplace_back(claim, point.camera_minus_board);
+            continue;
+        }
+        for (const auto& [before, camera_minus_board] : doubted)
+            if (follower.set_anew() &&
+                absolute(point.camera_minus_board - camera_minus_board) <= point.gap / 4)
+                before->withdraw(Finding::camera_clock);
+        doubted.clear();
     }
 }
 
