@@ -416,6 +416,23 @@ TEST_CASE("verify: a recording that begins and ends between a frame and its evid
     CHECK(without == 6);
 }
 
+TEST_CASE("verify: an IMU that was set up anew samples at other instants") {
+    Drive drive;
+    auto& samples = drive.samples();
+    const std::size_t anew = samples.size() / 2 + 7;
+    // Numbers go on after what was lost.
+    samples.erase(samples.begin() + static_cast<std::ptrdiff_t>(anew),
+                  samples.begin() + static_cast<std::ptrdiff_t>(anew) + 60);
+    for (std::size_t i = anew; i < samples.size(); ++i) samples[i].sample -= 60;
+    for (std::size_t i = anew; i < samples.size(); ++i) samples[i].number -= 60;
+    const bool reported = GENERATE(true, false);
+    if (reported) drive.evidence().set_up["imu0"] = {samples[anew].board - Duration{millisecond}};
+    const Verification verification = verify(drive.evidence());
+    INFO(to_text(verification));
+    const StreamVerdict& verdict = verdict_of(verification, "imu0");
+    CHECK((untrusted_items(verdict) == 0) == reported);
+}
+
 TEST_CASE("verify: suspect items are withheld, and are not judged") {
     Drive drive;
     for (std::size_t i = 0; i < 10; ++i) {

@@ -25,7 +25,9 @@ struct Found {
 
 class ImuJudge {
  public:
-    ImuJudge(const ImuEvidence& imu, const ClockWitness& clock) : imu_(imu), clock_(clock) {
+    ImuJudge(const ImuEvidence& imu, const std::vector<BoardTime>& set_up,
+             const ClockWitness& clock)
+        : imu_(imu), set_up_(set_up), clock_(clock) {
         std::size_t begin = 0;
         for (std::size_t i = 1; i <= imu.samples.size(); ++i) {
             if (i < imu.samples.size() && goes_on(imu.samples[i - 1], imu.samples[i])) continue;
@@ -39,14 +41,19 @@ class ImuJudge {
     StreamVerdict finish(StreamOrder order) const;
 
  private:
-    static bool goes_on(const StampedSample& last, const StampedSample& next) {
-        return last.life == next.life && last.epoch == next.epoch && last.sample < next.sample;
+    bool goes_on(const StampedSample& last, const StampedSample& next) const {
+        const bool anew = std::any_of(set_up_.begin(), set_up_.end(), [&](BoardTime at) {
+            return last.board < at && at <= next.board;
+        });
+        return !anew && last.life == next.life && last.epoch == next.epoch &&
+               last.sample < next.sample;
     }
     void judge_stretch(std::size_t begin, std::size_t end);
     void judge_numbers(const std::vector<std::size_t>& which);
     void judge_translation(const std::vector<std::size_t>& which);
 
     const ImuEvidence& imu_;
+    const std::vector<BoardTime>& set_up_;
     const ClockWitness& clock_;
     std::vector<Found> found_;
 };
@@ -126,8 +133,9 @@ StreamVerdict ImuJudge::finish(StreamOrder order) const {
 
 }  // namespace
 
-StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, StreamOrder order) {
-    return ImuJudge(imu, clock).finish(order);
+StreamVerdict judge_imu(const ImuEvidence& imu, const std::vector<BoardTime>& set_up,
+                        const ClockWitness& clock, StreamOrder order) {
+    return ImuJudge(imu, set_up, clock).finish(order);
 }
 
 }  // namespace versavis::client

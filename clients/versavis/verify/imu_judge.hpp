@@ -10,6 +10,7 @@
 namespace versavis::client {
 
 /// By their numbers, the samples beside them, and the messages that brought them.
-StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, StreamOrder order);
+StreamVerdict judge_imu(const ImuEvidence& imu, const std::vector<BoardTime>& set_up,
+                        const ClockWitness& clock, StreamOrder order);
 
 }  // namespace versavis::client

@@ -145,6 +145,11 @@ void add_sample(const StampedItem& stamped, const RecordedItem& item, RecordedEv
         ++imu.impossible;
 }
 
+std::string source_of(const EventMetadata& event) {
+    const char* name = event.source_name;
+    return {name, std::find(name, name + sizeof event.source_name, '\0')};
+}
+
 void add_item(const RecordedItem& item, RecordedEvidence& evidence) {
     const StampedItem stamped{item.number, item.life, item.time};
     switch (item.kind) {
@@ -155,6 +160,8 @@ void add_item(const RecordedItem& item, RecordedEvidence& evidence) {
             constexpr std::int64_t last_year_s = 1'000'000'000'000;
             const bool named = event.value >= 0 && event.value < last_year_s &&
                                possible(event.board_time, event.host_time);
+            if (event.kind == EventKind::imu_ready)
+                evidence.set_up[source_of(event)].push_back(event.board_time);
             if (event.kind == EventKind::utc_label && named)
                 evidence.clock.pulses.push_back(
                     {event.epoch, event.board_time, event.host_time, event.value});

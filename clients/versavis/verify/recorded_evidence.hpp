@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -129,6 +130,8 @@ struct RecordedEvidence {
     ClockEvidence clock;
     std::vector<CameraEvidence> cameras;
     std::vector<ImuEvidence> imus;
+    /// When the board set up an IMU, by its name: it sampled at other instants then.
+    std::map<std::string, std::vector<BoardTime>> set_up;
     MessageStamps message_stamps;
     std::string output_clock;  ///< as the service named it; empty: not known
 };

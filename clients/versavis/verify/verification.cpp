@@ -66,8 +66,12 @@ Verification verify(const RecordedEvidence& evidence) {
         if (!camera.frames.empty() || camera.impossible > 0)
             verification.streams.push_back(
                 judge_camera(camera, clock, order_of(camera.name, camera.gaps)));
-    for (const ImuEvidence& imu : evidence.imus)
-        verification.streams.push_back(judge_imu(imu, clock, order_of(imu.name, imu.gaps)));
+    for (const ImuEvidence& imu : evidence.imus) {
+        const auto found = evidence.set_up.find(imu.name);
+        verification.streams.push_back(judge_imu(
+            imu, found == evidence.set_up.end() ? std::vector<BoardTime>() : found->second, clock,
+            order_of(imu.name, imu.gaps)));
+    }
     std::vector<Duration> widths;
     for (const ClockBounds& life : clock.lives()) {
         ++verification.board_lives;
