@@ -20,8 +20,7 @@ struct PictureOffset {
 
 /// The pictures of one camera.
 struct PictureEvidence {
-    std::vector<PictureOffset>
-        offsets;  ///< by time; those that the motion does not show are not there
+    std::vector<PictureOffset> offsets;  ///< by time, wherever the motion shows one
     std::optional<Duration> calibrated;  ///< as Kalibr found it
     std::string problem{};               ///< why there are none
 };

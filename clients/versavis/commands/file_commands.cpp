@@ -95,7 +95,7 @@ void FileCommands::add_export(CLI::App& app) {
                 export_settings_.choice.max_sigma = Duration{static_cast<std::int64_t>(us * 1e3)};
             },
             "Leave out stamps of a larger sigma, us (default: 5000; any with --include-suspect)")
-        ->check(CLI::Range(0.0, 1e9))
+        ->check(CLI::Range(0.0, 4e6))  // an unknown sigma is above
         ->type_name("US");
     export_
         ->add_option("--compression", export_settings_.compression, "Bag compression: none or lz4")

@@ -47,6 +47,7 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
         ->needs(pictures);
     command_
         ->add_option("--focal", pictures_.focal, "Focal length in pixels, instead of a calibration")
+        ->check(CLI::PositiveNumber)
         ->needs(pictures);
     auto* sign = command_->add_option(
         "--sign", key_,
@@ -56,6 +57,7 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
                      "Verify nothing: print the verdict that was signed by the owner of this "
                      "public key, if it and the recording are unchanged")
         ->excludes(html)
+        ->excludes(pictures)
         ->excludes(sign);
 }
 

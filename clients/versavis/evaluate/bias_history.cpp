@@ -11,9 +11,9 @@ namespace versavis::client {
 
 namespace {
 
-// More of them tell no more of a drift, and take the cube of the time.
+// More of them show a drift no better, and take the cube of the time.
 constexpr std::size_t most_blocks = 128;
-// Fewer do not tell a drift from a random walk.
+// Fewer do not distinguish a drift from a random walk.
 constexpr std::size_t least_blocks = 32;
 // A block lasts for so many averaging times of a filter's shoulder, which would look smooth in
 // shorter ones.

@@ -154,7 +154,8 @@ std::optional<Line> fit_line(const std::vector<LedObservation>& shots,
 }
 
 struct Camera {
-    std::vector<LedObservation> shots;
+    const std::vector<LedObservation>* recorded = nullptr;
+    std::vector<LedObservation> shots;  ///< calibrated by the layout
     std::vector<Read> reads;
     LedLayout layout;
 };
@@ -262,8 +263,9 @@ std::vector<std::string> fitting_layouts(const std::map<std::string, Camera>& ca
             LedLayout layout{high_bit_first, backward, false};
             for (const auto& [name, camera] : cameras) {
                 layout.binary_first = camera.layout.binary_first;
+                const auto shots = calibrated_leds(*camera.recorded, rate_hz, layout);
                 const Increments some =
-                    increments(camera.shots, read_all(camera.shots, rate_hz, layout), rate_hz);
+                    increments(shots, read_all(shots, rate_hz, layout), rate_hz);
                 sum.all += some.all;
                 sum.wrong += some.wrong;
             }
@@ -399,7 +401,7 @@ Expected<LedReport> led_report(const LedObservations& shots, const LedReportSett
     report.rate_hz = settings.rate_hz;
     std::map<std::string, Camera> cameras;
     for (const auto& [name, of_camera] : shots) {
-        Camera camera{{}, {}, settings.layout};
+        Camera camera{&of_camera, {}, {}, settings.layout};
         const auto known = settings.binary_first.find(name);
         camera.layout.binary_first = known != settings.binary_first.end()
                                          ? known->second

@@ -231,6 +231,7 @@ Expected<> export_sequence(const Recording& recording, const ExportSettings& set
     std::filesystem::create_directories(directory, error);
     if (error) return failure(directory.string(), "cannot be created: " + error.message());
     const SelectedSequence& sequence = report.selection.sequences[index];
+    const std::size_t noted = report.notes.size();
     const auto stem = std::filesystem::path(settings.recording).stem().string();
     auto written =
         settings.kind == ExportKind::euroc
@@ -239,6 +240,9 @@ Expected<> export_sequence(const Recording& recording, const ExportSettings& set
             : export_bag(recording, report.selection, sequence, formats,
                          directory / (stem + ".bag"), settings.compression, settings.watch);
     if (!written) return written;
+    if (const std::string folder = sequence_folder(report.selection, index); !folder.empty())
+        for (std::size_t i = noted; i < report.notes.size(); ++i)
+            report.notes[i] = folder + ": " + report.notes[i];
     return write_kalibr(report.selection, calibration, directory);
 }
 

@@ -27,7 +27,7 @@ enum class SkipReason : std::uint8_t {
     repeated,      ///< an IMU sample with the data of the one before
     no_pixels,     ///< the file has no image for it
     another_size,  ///< its size or format is not that of the camera's first frame
-    brief,         ///< its sequence is too short, or without images
+    brief,         ///< its sequence is too short or without images, or another IMU has a hole
 };
 const char* to_string(SkipReason reason);
 

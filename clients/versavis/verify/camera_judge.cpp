@@ -234,7 +234,7 @@ void CameraJudge::judge_run(std::size_t run) {
 }
 
 /// A camera numbers every trigger, or those that it took. It may also take frames of its own, which
-/// only its clock tells from frames of later triggers.
+/// only its clock distinguishes from frames of later triggers.
 void CameraJudge::judge_steps(const std::vector<Claim*>& claims) const {
     for (std::size_t i = 1; i < claims.size(); ++i) {
         const FrameMetadata& last = claims[i - 1]->frame->frame;

@@ -20,7 +20,7 @@ class PictureJudge {
     /// By how much pictures and stamps differ there; none: they do not, or nothing shows it.
     std::optional<Duration> off(OutputTime at) const;
 
-    /// Of all; none: too few to tell.
+    /// Of all; none: there are too few.
     const std::optional<PictureOffset>& usual() const { return usual_; }
 
  private:
