@@ -241,7 +241,7 @@ int main(int argc, char** argv) {
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
     if (evaluate.chosen()) return evaluate.run();
     if (process.chosen()) return process.run();
-    if (verify.chosen()) return verify.run();
+    if (verify.chosen()) return verify.run(instance);
     if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "base/fail.hpp"
+#include "live_verification.hpp"
 #include "posix/file.hpp"
 #include "verify/signature.hpp"
 #include "verify/verification.hpp"
@@ -32,23 +33,27 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
                                   "Verify the timestamps of recordings: derive each again from "
                                   "what was recorded, by code of its own")),
       stop_(std::move(stop)) {
-    command_->add_option("recordings", files_, "Recordings (versavis record)")->required();
+    command_->add_option("recordings", files_,
+                         "Recordings (versavis record); with --live: cameras (default: all)");
     command_->add_flag("--json", json_, "Print one JSON object for each recording");
     auto* html =
         command_->add_option("--html", html_, "Write a report with time lines to this file");
     auto* pictures = command_->add_flag(
         "--pictures", compare_pictures_,
         "Compare the rotation of the pictures with the gyro, too: reads all pixels");
-    command_->add_option("--imu", pictures_.imu, "The IMU to compare with, if there are several")
-        ->needs(pictures);
-    command_
-        ->add_option("--calibration", pictures_.calibration,
-                     "Kalibr's camchain.yaml (default: the recording's attachment)")
-        ->needs(pictures);
+    auto* live = command_->add_flag(
+        "--live", live_,
+        "Compare the pictures of the running cameras with the gyro until stopped, and report when "
+        "they no longer belong to their stamps");
+    command_->add_option("--seconds", seconds_, "Stop after this time (default: when interrupted)")
+        ->check(CLI::PositiveNumber)
+        ->needs(live);
+    command_->add_option("--imu", pictures_.imu, "The IMU to compare with, if there are several");
+    command_->add_option("--calibration", pictures_.calibration,
+                         "Kalibr's camchain.yaml (default: the recording's attachment)");
     command_
         ->add_option("--focal", pictures_.focal, "Focal length in pixels, instead of a calibration")
-        ->check(CLI::PositiveNumber)
-        ->needs(pictures);
+        ->check(CLI::PositiveNumber);
     auto* sign = command_->add_option(
         "--sign", key_,
         "Write FILE.verdict.json and its signature by this Ed25519 key, FILE.verdict.sig");
@@ -59,13 +64,32 @@ VerifyCommand::VerifyCommand(CLI::App& app, std::function<bool()> stop)
         ->excludes(html)
         ->excludes(pictures)
         ->excludes(sign);
+    for (auto* option : {html, pictures, sign}) live->excludes(option);
+    live->excludes("--signed-by");
 }
 
 bool VerifyCommand::chosen() const { return command_->parsed(); }
 
 /// 0: all is proved; 1: something is not to be trusted; 2: something is plausible only. A recording
 /// that cannot be read does not keep the others from being verified.
-int VerifyCommand::run() const { return public_key_.empty() ? verify_files() : check_signatures(); }
+int VerifyCommand::run(const std::string& instance) const {
+    if (live_) return verify_instance(instance);
+    if (files_.empty())
+        return fail({"verify", "no recording is named", "name one, or give --live"}, EX_USAGE);
+    const bool compares =
+        !pictures_.imu.empty() || !pictures_.calibration.empty() || pictures_.focal > 0;
+    if (compares && !compare_pictures_)
+        return fail(
+            {"--imu, --calibration, --focal", "are for pictures", "give --pictures or --live, too"},
+            EX_USAGE);
+    return public_key_.empty() ? verify_files() : check_signatures();
+}
+
+int VerifyCommand::verify_instance(const std::string& instance) const {
+    const auto worst = verify_live({instance, files_, pictures_.imu, pictures_.calibration,
+                                    pictures_.focal, seconds_, json_, stop_});
+    return worst ? exit_code(*worst) : fail(worst.error());
+}
 
 int VerifyCommand::verify_files() const {
     if (!html_.empty() && files_.size() > 1)

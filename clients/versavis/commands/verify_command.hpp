@@ -20,10 +20,11 @@ class VerifyCommand {
     VerifyCommand& operator=(const VerifyCommand&) = delete;
 
     bool chosen() const;
-    int run() const;
+    int run(const std::string& instance) const;
 
  private:
     int verify_files() const;
+    int verify_instance(const std::string& instance) const;
     std::map<std::string, PictureEvidence> pictures_of(const std::string& file) const;
     int check_signatures() const;
 
@@ -33,6 +34,8 @@ class VerifyCommand {
     std::string html_;
     ImuEvaluationSettings pictures_;
     bool compare_pictures_ = false;
+    bool live_ = false;
+    double seconds_ = 0;
     std::string key_;
     std::string public_key_;
     bool json_ = false;

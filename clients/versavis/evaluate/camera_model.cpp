@@ -55,4 +55,12 @@ Eigen::Vector3d bearing_of(const CameraModel& camera, double x, double y) {
     return at.homogeneous().normalized();
 }
 
+CameraModel reduced(CameraModel camera, std::uint32_t factor) {
+    camera.fx /= factor;
+    camera.fy /= factor;
+    camera.cx = (camera.cx + 0.5) / factor - 0.5;  // pixel 0 has its middle at 0
+    camera.cy = (camera.cy + 0.5) / factor - 0.5;
+    return camera;
+}
+
 }  // namespace versavis::client

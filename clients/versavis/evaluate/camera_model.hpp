@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 
 namespace versavis::client {
 
@@ -22,5 +23,8 @@ struct CameraModel {
 /// A unit vector. Source of the distortions: Brown 1966; Kannala and Brandt 2006, as OpenCV and
 /// Kalibr use them.
 Eigen::Vector3d bearing_of(const CameraModel& camera, double x, double y);
+
+/// Of pictures in which each pixel is the mean of a square of `factor` pixels.
+CameraModel reduced(CameraModel camera, std::uint32_t factor);
 
 }  // namespace versavis::client

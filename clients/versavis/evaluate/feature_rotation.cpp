@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <random>
@@ -17,15 +18,12 @@ namespace versavis::client {
 
 namespace {
 
-// Features looked for in each frame. If lower, the rotation is less certain.
-constexpr int features = 300;
-
 // Corners weaker than this share of the strongest are left out. If lower, more of them slide along
 // edges; if higher, scenes with one bright lamp have too few.
 constexpr double quality = 0.01;
 
-// Of the frame's width, between features. If lower, they crowd on one object; if higher, less than
-// `features` fit.
+// Of the frame's width, between features. If lower, they crowd on one object; if higher, fewer fit
+// than are looked for.
 constexpr double spacing = 0.025;
 
 // Side of the tracked patch, pixels. If lower, more are lost in noise; if higher, it takes more
@@ -112,7 +110,7 @@ Eigen::Vector3d sigma_of(const Bearings& now, const std::vector<double>& weights
     return miss * information.inverse().diagonal().cwiseSqrt();
 }
 
-std::vector<cv::Point2f> corners(const cv::Mat& image) {
+std::vector<cv::Point2f> corners(const cv::Mat& image, int features) {
     std::vector<cv::Point2f> points;
     cv::goodFeaturesToTrack(image, points, features, quality, image.cols * spacing);
     return points;
@@ -144,6 +142,7 @@ void track(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second
 
 struct FeatureRotation::Tracker {
     CameraModel camera;
+    int features;
     cv::Size size;
     std::vector<cv::Mat> pyramid;  ///< of the frame before
     std::vector<cv::Point2f> corners;
@@ -209,21 +208,24 @@ std::optional<FrameRotation> FeatureRotation::Tracker::add(const GreyImage& imag
         result->to = at;
     }
     pyramid = std::move(now);
-    corners = client::corners(pixels);
+    corners = client::corners(pixels, features);
     time = at;
     return result;
 }
+
+void FeatureRotation::use_one_thread() { cv::setNumThreads(1); }
 
 FeatureRotation::FeatureRotation(std::unique_ptr<Tracker> tracker) : tracker_(std::move(tracker)) {}
 FeatureRotation::FeatureRotation(FeatureRotation&&) noexcept = default;
 FeatureRotation& FeatureRotation::operator=(FeatureRotation&&) noexcept = default;
 FeatureRotation::~FeatureRotation() = default;
 
-Expected<FeatureRotation> FeatureRotation::create(const CameraModel& camera) {
+Expected<FeatureRotation> FeatureRotation::create(const CameraModel& camera, int features) {
     if (!(camera.fx > 0) || !(camera.fy > 0))
         return failure("camera", "has no focal length", "give it in pixels, or a calibration");
     auto tracker = std::make_unique<Tracker>();
     tracker->camera = camera;
+    tracker->features = features;
     return FeatureRotation(std::move(tracker));
 }
 

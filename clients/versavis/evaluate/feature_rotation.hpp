@@ -16,8 +16,12 @@ namespace versavis::client {
 /// which adds the frames in order.
 class FeatureRotation {
  public:
-    /// Error: built without OpenCV.
-    static Expected<FeatureRotation> create(const CameraModel& camera);
+    /// `features`: looked for in each frame; with fewer, the rotation is less certain, and it takes
+    /// less time. Error: built without OpenCV.
+    static Expected<FeatureRotation> create(const CameraModel& camera, int features = 300);
+
+    /// Of the whole process: OpenCV's own threads make small pictures dearer, and not faster.
+    static void use_one_thread();
 
     FeatureRotation(FeatureRotation&&) noexcept;
     FeatureRotation& operator=(FeatureRotation&&) noexcept;

@@ -6,12 +6,15 @@ namespace versavis::client {
 
 struct FeatureRotation::Tracker {};
 
+void FeatureRotation::use_one_thread() {}
+
 FeatureRotation::FeatureRotation(std::unique_ptr<Tracker> tracker) : tracker_(std::move(tracker)) {}
 FeatureRotation::FeatureRotation(FeatureRotation&&) noexcept = default;
 FeatureRotation& FeatureRotation::operator=(FeatureRotation&&) noexcept = default;
 FeatureRotation::~FeatureRotation() = default;
 
-Expected<FeatureRotation> FeatureRotation::create(const CameraModel& /*camera*/) {
+Expected<FeatureRotation> FeatureRotation::create(const CameraModel& /*camera*/,
+                                                  int /*features*/) {
     return failure("features", "this program was built without OpenCV",
                    "install Debian's libopencv-video-dev and build it again");
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluate/grey_picture.hpp"
+#include "versavis/pixel_format.hpp"
 
 namespace versavis::client {
 
@@ -18,5 +19,13 @@ struct GreyImage {
 /// Of a Bayer mosaic (`pixel_format`) each pixel is the mean of itself and its neighbours to the
 /// right and below: the image then lies half a pixel further left and up.
 GreyImage grey_image(const GreyPicture& picture, std::uint32_t pixel_format);
+
+/// By how much a picture may be reduced so that it stays `width` pixels wide, at least. A Bayer
+/// mosaic is always reduced, by an even factor, so that each pixel has all colours.
+std::uint32_t reduction(const ImageView& view, std::uint32_t width);
+
+/// Each pixel is the mean of a square of `factor` pixels; what is left at the right and below is
+/// cut off. The format must not be packed.
+GreyImage reduced_image(const ImageView& view, std::uint32_t factor);
 
 }  // namespace versavis::client

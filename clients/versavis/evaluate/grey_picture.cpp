@@ -7,18 +7,14 @@
 
 namespace versavis::client {
 
-namespace {
-
-/// Of the formats with 16 bits for each sample, how many of them are used.
-std::uint16_t full_scale(std::uint32_t bytes, const std::string& format) {
-    if (bytes == 1) return 255;
+std::uint16_t full_scale(std::uint32_t pixel_format) {
+    const std::string format = pixel_format_name(pixel_format);
+    if (pixel_layout(pixel_format).bytes_per_channel == 1) return 255;
     for (const unsigned bits : {10U, 12U, 14U})
         if (format.ends_with(std::to_string(bits)))
             return static_cast<std::uint16_t>((1U << bits) - 1);
     return 0xFFFF;
 }
-
-}  // namespace
 
 Expected<GreyPicture> grey_picture(const std::string& stream, const FrameMetadata& frame,
                                    std::span<const std::byte> pixels) {
@@ -38,7 +34,7 @@ Expected<GreyPicture> grey_picture(const std::string& stream, const FrameMetadat
     GreyPicture picture;
     picture.width = frame.width;
     picture.height = frame.height;
-    picture.full = full_scale(layout.bytes_per_channel, format);
+    picture.full = full_scale(frame.pixel_format);
     picture.pixels.resize(std::size_t{frame.width} * frame.height);
     std::size_t out = 0;
     for (std::size_t y = 0; y < frame.height; ++y) {

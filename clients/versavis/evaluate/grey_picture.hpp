@@ -27,4 +27,7 @@ struct GreyPicture {
 Expected<GreyPicture> grey_picture(const std::string& stream, const FrameMetadata& frame,
                                    std::span<const std::byte> pixels);
 
+/// The highest value of a pixel: formats of two bytes may use fewer bits.
+std::uint16_t full_scale(std::uint32_t pixel_format);
+
 }  // namespace versavis::client

@@ -4,13 +4,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
+#include "evaluate/camera_calibration.hpp"
 #include "evaluate/grey_image.hpp"
 #include "evaluate/recorded_imu.hpp"
-#include "export/export.hpp"
-#include "recording/kalibr_yaml.hpp"
 
 namespace versavis::client {
 
@@ -20,49 +17,16 @@ using nlohmann::json;
 
 constexpr double degrees = 180 / M_PI;
 
-/// Text of the camchain, and what errors call it; none: there is no calibration.
-Expected<std::optional<std::pair<std::string, std::string>>> camchain_text_of(
-    const Recording& recording, const std::string& path) {
-    using Found = std::optional<std::pair<std::string, std::string>>;
+/// None: there is no calibration.
+Expected<std::optional<Camchain>> camchain_of(const Recording& recording, const std::string& path) {
     if (path.empty()) {
         const Attachment* attached = recording.attachment("calibration/camchain.yaml");
-        if (attached == nullptr) return Found();
-        return Found({attached->content, attached->name});
+        if (attached == nullptr) return std::optional<Camchain>();
+        return std::optional(Camchain{attached->content, attached->name});
     }
-    std::ifstream file(path, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) return failure(path, "cannot be read", "check its name and permissions");
-    return Found({text, path});
-}
-
-Expected<CameraModel> model_of(const CalibratedCamera& camera, const std::string& where) {
-    const auto wrong = [&](const std::string& what) {
-        return failure(where + ", " + camera.key, what,
-                       "calibrate as pinhole with radtan or equidistant, or give --focal");
-    };
-    if (camera.model != "pinhole") return wrong("the model " + camera.model + " is not supported");
-    if (camera.intrinsics.size() != 4) return wrong("a pinhole has four intrinsics");
-    CameraModel model{camera.intrinsics[0], camera.intrinsics[1], camera.intrinsics[2],
-                      camera.intrinsics[3], Distortion::none,     {}};
-    if (camera.distortion == "radtan") model.distortion = Distortion::radtan;
-    if (camera.distortion == "equidistant") model.distortion = Distortion::equidistant;
-    if (model.distortion == Distortion::none) {
-        if (camera.distortion.empty() || camera.distortion == "none") return model;
-        return wrong("the distortion " + camera.distortion + " is not supported");
-    }
-    if (camera.coefficients.size() != 4) return wrong("four coefficients of distortion are needed");
-    std::copy(camera.coefficients.begin(), camera.coefficients.end(), model.coefficients.begin());
-    return model;
-}
-
-/// Those of a camchain are named by topic, or by key.
-const CalibratedCamera* camera_of(const std::vector<CalibratedCamera>& cameras,
-                                  const std::string& name) {
-    for (const CalibratedCamera& camera : cameras)
-        if (camera.topic.rfind("/" + name + "/", 0) == 0) return &camera;
-    for (const CalibratedCamera& camera : cameras)
-        if (camera.key == name) return &camera;
-    return nullptr;
+    auto read = read_camchain(path);
+    if (!read) return Unexpected(read.error());
+    return std::optional(std::move(*read));
 }
 
 /// Reads the camera's frames, and follows features from each to the next.
@@ -152,6 +116,21 @@ void add_notes(const RecordedImu& imu, ImuEvaluation& evaluation) {
 
 json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+std::string rotation_text(const ImuEvaluation& evaluation) {
+    const RotationOffset& found = evaluation.found;
+    std::string text = fmt::format("rotation from {} to {}", evaluation.imu, evaluation.camera);
+    if (!found.rotation_shown)
+        return text +
+               " is not known: the rig turned about one axis only. For the rotation, turn "
+               "it about a second axis, too\n";
+    text += fmt::format(", +- {:.2f} degrees\n", found.rotation_sigma.maxCoeff() * degrees);
+    const Eigen::Matrix3d rotation = found.camera_from_imu.toRotationMatrix();
+    for (int row = 0; row < 3; ++row)
+        text += fmt::format("  {:9.5f} {:9.5f} {:9.5f}\n", rotation(row, 0), rotation(row, 1),
+                            rotation(row, 2));
+    return text;
+}
+
 }  // namespace
 
 Expected<CameraModel> camera_model(const Recording& recording,
@@ -159,29 +138,18 @@ Expected<CameraModel> camera_model(const Recording& recording,
                                    const FrameMetadata& frame, ImuEvaluation& evaluation) {
     if (settings.focal > 0) {
         evaluation.notes.emplace_back("the lens is assumed to be free of distortion (--focal)");
-        return CameraModel{settings.focal,           settings.focal,   (frame.width - 1) / 2.0,
-                           (frame.height - 1) / 2.0, Distortion::none, {}};
+        return pinhole(settings.focal, frame.width, frame.height);
     }
-    const auto text = camchain_text_of(recording, settings.calibration);
-    if (!text) return Unexpected(text.error());
-    if (!*text)
+    const auto camchain = camchain_of(recording, settings.calibration);
+    if (!camchain) return Unexpected(camchain.error());
+    if (!*camchain)
         return failure(evaluation.camera, "the recording has no calibration of its lens",
                        "give --calibration camchain.yaml, or --focal with its focal length in "
                        "pixels");
-    const auto& [content, where] = **text;
-    const auto cameras = parse_camchain(content, where);
-    if (!cameras) return Unexpected(cameras.error());
-    const CalibratedCamera* camera = camera_of(*cameras, evaluation.camera);
-    if (camera == nullptr)
-        return failure(where, "has no camera " + evaluation.camera,
-                       "its rostopic must be " + image_topic(evaluation.camera));
-    if (camera->width != 0 && (camera->width != frame.width || camera->height != frame.height))
-        return failure(where + ", " + camera->key,
-                       fmt::format("is for {} x {} pixels, the frames have {} x {}", camera->width,
-                                   camera->height, frame.width, frame.height),
-                       "calibrate at the size that is recorded");
-    evaluation.calibrated_shift_s = camera->time_shift_s;
-    return model_of(*camera, where);
+    auto calibration = calibration_of(**camchain, evaluation.camera, frame.width, frame.height);
+    if (!calibration) return Unexpected(calibration.error());
+    evaluation.calibrated_shift_s = calibration->time_shift_s;
+    return calibration->model;
 }
 
 Expected<SeenMotion> seen_motion(const Recording& recording, const ImuEvaluationSettings& settings,
@@ -220,8 +188,10 @@ json to_json(const ImuEvaluation& evaluation) {
             {"imu", evaluation.imu},
             {"timeshift_cam_imu_s", found.offset_s},
             {"timeshift_cam_imu_sigma_s", found.offset_sigma_s},
-            {"rotation_cam_imu_wxyz", {q.w(), q.x(), q.y(), q.z()}},
-            {"rotation_sigma_rad", vector_json(found.rotation_sigma)},
+            {"rotation_cam_imu_wxyz",
+             found.rotation_shown ? json{q.w(), q.x(), q.y(), q.z()} : json(nullptr)},
+            {"rotation_sigma_rad",
+             found.rotation_shown ? vector_json(found.rotation_sigma) : json(nullptr)},
             {"gyro_bias_rad_s", vector_json(found.gyro_bias)},
             {"gyro_bias_sigma_rad_s", vector_json(found.gyro_bias_sigma)},
             {"residual_rad", found.residual},
@@ -236,7 +206,6 @@ json to_json(const ImuEvaluation& evaluation) {
 
 std::string to_text(const ImuEvaluation& evaluation) {
     const RotationOffset& found = evaluation.found;
-    const Eigen::Matrix3d rotation = found.camera_from_imu.toRotationMatrix();
     std::string text = fmt::format(
         "{} and {}: {} rotations between {} frames, residual {:.2f} mrad, {:.1f} % outliers\n"
         "time of {} = time of {} {:+.3f} ms +- {:.3f} ms\n",
@@ -249,11 +218,7 @@ std::string to_text(const ImuEvaluation& evaluation) {
     if (evaluation.calibrated_shift_s)
         text += fmt::format("  the calibration says {:+.3f} ms\n",
                             *evaluation.calibrated_shift_s * 1e3);
-    text += fmt::format("rotation from {} to {}, +- {:.2f} degrees\n", evaluation.imu,
-                        evaluation.camera, found.rotation_sigma.maxCoeff() * degrees);
-    for (int row = 0; row < 3; ++row)
-        text += fmt::format("  {:9.5f} {:9.5f} {:9.5f}\n", rotation(row, 0), rotation(row, 1),
-                            rotation(row, 2));
+    text += rotation_text(evaluation);
     text +=
         fmt::format("bias of the gyro {:.5f} {:.5f} {:.5f} rad/s +- {:.5f}\n", found.gyro_bias.x(),
                     found.gyro_bias.y(), found.gyro_bias.z(), found.gyro_bias_sigma.maxCoeff());

@@ -24,6 +24,8 @@ struct FrameRotation {
 struct RotationOffset {
     double offset_s = 0;  ///< time of the IMU = time of the frame + offset
     double offset_sigma_s = 0;
+    bool rotation_shown =
+        false;  ///< else the motion was about one axis, and leaves what follows open
     Eigen::Quaterniond camera_from_imu;  ///< turns the IMU's axes into the camera's
     Eigen::Vector3d rotation_sigma;      ///< rad, about the camera's axes
     Eigen::Vector3d gyro_bias;           ///< rad/s, in the IMU's axes

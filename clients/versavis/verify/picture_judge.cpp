@@ -13,12 +13,6 @@ namespace {
 /// Fewer do not show which of them is unlike the others.
 constexpr std::size_t least_offsets = 3;
 
-/// Less is what a moving camera and near things may do to an offset.
-constexpr Duration least_departure = microseconds(500);
-
-/// Kalibr's own offset is hardly known better.
-constexpr Duration least_miscalibration = milliseconds(1);
-
 constexpr double departing_sigmas = 5;
 
 bool departs(Duration by, Duration sigma, Duration least) {

@@ -11,6 +11,12 @@
 
 namespace versavis::client {
 
+/// Less is what a moving camera and near things may do to an offset.
+constexpr Duration least_departure = microseconds(500);
+
+/// Kalibr's own offset is hardly known better.
+constexpr Duration least_miscalibration = milliseconds(1);
+
 class PictureJudge {
  public:
     /// What a shutter and a filter delay is the same throughout: an offset counts that differs from
