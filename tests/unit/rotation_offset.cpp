@@ -6,101 +6,15 @@
 #include <random>
 
 #include "evaluate/picture_offsets.hpp"
+#include "moving_world.hpp"
 #include "verify/picture_judge.hpp"
 
 using namespace versavis;
 using namespace versavis::client;
+using namespace versavis::test;
 using Catch::Contains;
 
 namespace {
-
-constexpr double pi = 3.14159265358979;
-
-struct Wave {
-    Eigen::Vector3d amplitude;
-    double frequency;
-    double phase;
-};
-
-/// What moves, and how it is seen.
-struct MovingWorld {
-    double rate_rms = 0.6;  ///< rad/s, each axis
-    double bandwidth_hz = 2;
-    double seconds = 30;
-    double camera_sigma = 0.5e-3;
-    double outliers = 0;
-    double gyro_density = 2.4e-4;
-    double gyro_hz = 200;
-    double offset_s = 0.0123;
-    Eigen::Vector3d axes{1, 1, 1};  ///< shares of the rate
-};
-
-const Eigen::Vector3d true_rotation(1.1, -0.4, 0.7);
-const Eigen::Vector3d true_bias(0.01, -0.02, 0.005);
-
-struct Seen {
-    std::vector<FrameRotation> frames;
-    std::vector<GyroSample> gyro;
-};
-
-OutputTime output_at(double s) { return {1'700'000'000'000'000'000 + std::llround(s * 1e9)}; }
-
-class OffsetSimulation {
- public:
-    OffsetSimulation(const MovingWorld& world, unsigned seed) : world_(world), random_(seed) {
-        constexpr int count = 12;
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < count; ++i) {
-                const double amplitude = world.axes[axis] * world.rate_rms * std::sqrt(2.0 / count);
-                waves_.push_back({amplitude * Eigen::Vector3d::Unit(axis),
-                                  world.bandwidth_hz * uniform(), 2 * pi * uniform()});
-            }
-    }
-
-    Seen run() {
-        Seen seen;
-        const double interval = 1 / world_.gyro_hz;
-        for (int i = 0; i * interval < world_.seconds + 2; ++i)
-            seen.gyro.push_back({output_at(i * interval),
-                                 rate(i * interval) + true_bias +
-                                     noise(world_.gyro_density * std::sqrt(world_.gyro_hz))});
-        const Eigen::Quaterniond camera = rotation_by(true_rotation);
-        constexpr double period = 0.05;
-        for (int i = 0; i < world_.seconds / period; ++i) {
-            const double from = 1 + i * period;
-            Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-            constexpr int steps = 40;
-            for (int k = 0; k < steps; ++k)
-                turn = turn * rotation_by(rate(from + (k + 0.5) * period / steps) * period / steps);
-            Eigen::Quaterniond shown =
-                camera * turn * camera.conjugate() * rotation_by(noise(world_.camera_sigma));
-            if (uniform() < world_.outliers) shown = rotation_by(noise(0.05));
-            seen.frames.push_back({output_at(from - world_.offset_s),
-                                   output_at(from + period - world_.offset_s), rotation_of(shown),
-                                   Eigen::Vector3d::Constant(world_.camera_sigma)});
-        }
-        return seen;
-    }
-
- private:
-    Eigen::Vector3d rate(double s) const {
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        for (const Wave& wave : waves_)
-            sum += wave.amplitude * std::sin(2 * pi * wave.frequency * s + wave.phase);
-        return sum;
-    }
-    double uniform() { return std::uniform_real_distribution<double>()(random_); }
-    Eigen::Vector3d noise(double sigma) {
-        std::normal_distribution<double> normal(0, sigma);
-        const double x = normal(random_);
-        const double y = normal(random_);
-        return {x, y, normal(random_)};
-    }
-
-    MovingWorld world_;
-    std::mt19937_64 random_;
-    std::vector<Wave> waves_;
-};
 
 struct Score {
     double rms_s = 0;
@@ -240,7 +154,7 @@ TEST_CASE("rotation_offset: turns about one axis show the offset, but not the ro
 TEST_CASE("rotation_offset: periodic motion fits more than once", "[rotation_offset]") {
     Seen seen;
     const auto rate = [](double s) {
-        const double phase = 2 * pi * 5 * s;
+        const double phase = 2 * M_PI * 5 * s;
         return Eigen::Vector3d(0.5 * std::sin(phase), 0.5 * std::sin(phase + 1),
                                0.5 * std::cos(2 * phase));
     };
@@ -263,7 +177,7 @@ TEST_CASE("rotation_offset: a steady cone shows a delay as a turn about its axis
           "[rotation_offset]") {
     Seen seen;
     for (int i = 0; i < 6400; ++i) {
-        const double phase = 2 * pi * 0.7 * i * 0.005;
+        const double phase = 2 * M_PI * 0.7 * i * 0.005;
         seen.gyro.push_back(
             {output_at(i * 0.005), {0.5 * std::sin(phase), 0.5 * std::cos(phase), 0}});
     }

@@ -159,10 +159,9 @@ class LiveVerification {
     }
 
  private:
-    void say(const std::string& text) {
+    void say(const std::string& text, bool alarm = false) {
         progress_.end();
-        fmt::print("{}\n", text);
-        std::fflush(stdout);
+        settings_.say(text, alarm);
     }
 
     /// Waits for a second when there is no IMU or no camera yet.
@@ -266,7 +265,7 @@ class LiveVerification {
             say(fmt::format("{}: time of {} = time of {} {:+.3f} ms +- {:.3f} ms from now on",
                             camera.name(), imu_name_, camera.name(), ms(usual->offset),
                             ms(usual->sigma)));
-        if (departure && !before) say(alarm(camera, *departure));
+        if (departure && !before) say(alarm(camera, *departure), true);
         if (before && !departure)
             say(fmt::format("{}: pictures and stamps belong together again", camera.name()));
     }
@@ -278,7 +277,8 @@ class LiveVerification {
         };
         const bool all = std::all_of(cameras_.begin(), cameras_.end(), same);
         const std::string either = fmt::format("its stamps or those of {} are wrong", imu_name_);
-        const std::string imu = fmt::format("as of all cameras: those of {} are wrong", imu_name_);
+        const std::string imu =
+            fmt::format("all cameras do, so the stamps of {} are wrong", imu_name_);
         return fmt::format(
             "{}: pictures and stamps differ by {:+.1f} +- {:.1f} ms since {}: {}; for the cause, "
             "record and run 'versavis verify'",

@@ -20,10 +20,11 @@ struct LiveVerificationSettings {
     double focal = 0;                  ///< pixels; 0: by the calibration
     double seconds = 0;                ///< 0: until it is stopped
     bool json = false;
-    std::function<bool()> stop;
+    std::function<bool()> stop;  ///< asked between two frames
+    std::function<void(const std::string& line, bool alarm)> say;
 };
 
-/// Reads until it is stopped, and prints what changes, or with `json` each comparison. Returns the
+/// Reads until it is stopped, and says what changes, or with `json` each comparison. Returns the
 /// worst that it saw: untrusted where pictures and stamps of a camera differed, plausible where a
 /// camera could not be judged. Errors: no calibration, no such camera.
 Expected<Grade> verify_live(const LiveVerificationSettings& settings);

@@ -6,6 +6,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
 #include "base/fail.hpp"
 #include "live_verification.hpp"
@@ -86,8 +88,14 @@ int VerifyCommand::run(const std::string& instance) const {
 }
 
 int VerifyCommand::verify_instance(const std::string& instance) const {
+    // The journal takes this for the priority of the line (sd-daemon(3)).
+    const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
+    const auto say = [journal](const std::string& line, bool alarm) {
+        fmt::print("{}{}\n", journal && alarm ? "<4>" : "", line);
+        std::fflush(stdout);
+    };
     const auto worst = verify_live({instance, files_, pictures_.imu, pictures_.calibration,
-                                    pictures_.focal, seconds_, json_, stop_});
+                                    pictures_.focal, seconds_, json_, stop_, say});
     return worst ? exit_code(*worst) : fail(worst.error());
 }
 

@@ -33,10 +33,10 @@ constexpr double together_sigmas = 5.5;
 constexpr double each_sigmas = 2;
 
 // By which the scatter of the offsets is judged: ten minutes.
-constexpr std::size_t most_misses = 30;
+constexpr std::size_t most_changes = 30;
 
 // Half of the absolute values of normal errors are below so many sigmas.
-constexpr double median_miss = 0.6745;
+constexpr double median_change = 0.6745;
 
 double ns(Duration d) { return static_cast<double>(d.ns); }
 double weight(const PictureOffset& one) {
@@ -74,21 +74,26 @@ Departure mean_departure(std::deque<PictureOffset>::const_iterator begin,
 void OffsetWatch::add(const PictureOffset& offset) {
     if (!usual_) return learn(offset);
     latest_.push_back(offset);
-    if (latest_.size() > most_departing) {
-        const PictureOffset& oldest = latest_.front();
-        misses_.push_back(std::abs(sigmas(oldest)));
-        if (misses_.size() > most_misses) misses_.pop_front();
-        if (!departure_ && learned_.size() < most_learned &&
-            absolute(oldest.offset - usual_->offset) < least_departure)
-            learn(oldest);
-        latest_.pop_front();
-    }
+    if (latest_.size() > most_departing) settle();
     const auto found = departing();
     if (departure_ && agrees_again())
         departure_.reset();
     else if (found)
         departure_ =
             Departure{found->by, found->sigma, departure_ ? departure_->since : found->since};
+}
+
+/// The oldest of the latest ones departs from nothing any more: it counts for what is usual.
+void OffsetWatch::settle() {
+    const PictureOffset& oldest = latest_.front();
+    const PictureOffset& next = latest_[1];
+    const double change = ns(next.offset - oldest.offset);
+    changes_.push_back(std::abs(change) / std::sqrt(1 / weight(oldest) + 1 / weight(next)));
+    if (changes_.size() > most_changes) changes_.pop_front();
+    if (!departure_ && learned_.size() < most_learned &&
+        absolute(oldest.offset - usual_->offset) < least_departure)
+        learn(oldest);
+    latest_.pop_front();
 }
 
 void OffsetWatch::learn(const PictureOffset& offset) {
@@ -112,10 +117,13 @@ double OffsetWatch::sigmas(const PictureOffset& offset) const {
     return ns(offset.offset - usual_->offset) * std::sqrt(weight(offset));
 }
 
-/// Of the offsets against their sigmas; 1 if these are honest.
+/// From one offset to the next, against their sigmas; 1 if these are honest. A drift hardly counts,
+/// and neither does what chance makes of few changes.
 double OffsetWatch::scatter() const {
-    if (misses_.size() < least_learned) return 1;
-    return std::max(1.0, median(std::vector(misses_.begin(), misses_.end())) / median_miss);
+    if (changes_.size() < most_departing) return 1;
+    const std::vector<double> changes(changes_.begin(), changes_.end());
+    const double chance = 1 - 1 / std::sqrt(static_cast<double>(changes.size()));
+    return std::max(1.0, chance * median(changes) / median_change);
 }
 
 std::optional<Departure> OffsetWatch::departing() const {

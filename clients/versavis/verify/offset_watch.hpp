@@ -34,6 +34,7 @@ class OffsetWatch {
  private:
     double sigmas(const PictureOffset& offset) const;
     double scatter() const;
+    void settle();
     void learn(const PictureOffset& offset);
     std::optional<Departure> departing() const;
     bool agrees_again() const;
@@ -42,7 +43,7 @@ class OffsetWatch {
     std::vector<PictureOffset> learned_;
     std::optional<PictureOffset> usual_;
     std::deque<PictureOffset> latest_;  ///< that were not judged yet, or depart
-    std::deque<double> misses_;         ///< of earlier ones, in sigmas
+    std::deque<double> changes_;        ///< from one earlier one to the next, in sigmas
     std::optional<Departure> departure_;
 };
 
