@@ -15,7 +15,7 @@ using namespace versavis::test;
 
 namespace {
 
-constexpr Duration watched_stretch = seconds(20);
+constexpr Duration watched_stretch = seconds(15);
 
 /// Stretches with normal errors, one after the other.
 struct Watched {
@@ -105,10 +105,10 @@ TEST_CASE("offset_watch: an offset that is not Kalibr's is named, until it is") 
 
 namespace {
 
-/// 20 s of a robot that turns, seen by a camera that looks far.
+/// 15 s of a robot that turns, seen by a camera that looks far.
 MovingWorld ordinary() {
     MovingWorld world;
-    world.seconds = 20;
+    world.seconds = 15;
     world.period_s = 0.1;
     world.camera_sigma = 0.1e-3;  // as of the rig at 240 x 180 pixels
     world.rate_rms = 0.3;
@@ -119,7 +119,7 @@ MovingWorld ordinary() {
     return world;
 }
 
-/// What the next 20 s are like; darkness and rest show nothing.
+/// What the next 15 s are like; darkness and rest show nothing.
 MovingWorld weather(std::mt19937_64& random) {
     const auto chance = [&](double share) {
         return std::uniform_real_distribution<double>()(random) < share;
@@ -162,7 +162,7 @@ std::optional<PictureOffset> compare(const MovingWorld& world, unsigned seed, Ou
 TEST_CASE("offset_watch: drives in all weathers raise no alarm, and a step of 1 ms one in time",
           "[statistics]") {
     std::mt19937_64 random(7);
-    const auto count = static_cast<unsigned>(drive_hours() * 180);
+    const auto count = static_cast<unsigned>(drive_hours() * 240);
     OffsetWatch watch;
     std::size_t compared = 0;
     OutputTime time = output_at(0);
@@ -178,10 +178,10 @@ TEST_CASE("offset_watch: drives in all weathers raise no alarm, and a step of 1 
     REQUIRE(watch.usual());
     CHECK(absolute(watch.usual()->offset - microseconds(12'300)) < microseconds(300));
 
-    // In ordinary motion: half a minute of it and a stretch that has begun before.
+    // In ordinary motion, within a minute: three stretches, and one that has begun before.
     MovingWorld plain = ordinary();
     plain.offset_s = 0.0113;
-    for (unsigned i = 0; i < 2; ++i, time = time + watched_stretch) {
+    for (unsigned i = 0; i < 3; ++i, time = time + watched_stretch) {
         const auto offset = compare(plain, count + i, time);
         REQUIRE(offset);
         watch.add(*offset);

@@ -399,6 +399,19 @@ TEST_CASE("verify: a camera that takes a frame of its own still proves the other
     CHECK(verdict_of(verification, "cam0").grade() == Grade::proved);
 }
 
+TEST_CASE("verify: a camera that begins to count anew still proves its frames") {
+    Drive drive;
+    auto& arrivals = drive.camera(0).runs[0].arrivals;
+    const std::uint64_t count = 200;
+    for (std::size_t k = count; k < arrivals.size(); ++k) arrivals[k].block_id -= 1000 + count - 1;
+    for (StampedFrame& each : drive.frames(0))
+        if (each.frame.block_id >= 1000 + count) each.frame.block_id -= 1000 + count - 1;
+    CHECK(verdict_of(verify(drive.evidence()), "cam0").grade() == Grade::proved);
+    // Without a clock of its own, nothing says which trigger a frame is of then.
+    for (auto& arrival : arrivals) arrival.camera = {};
+    CHECK(verdict_of(verify(drive.evidence()), "cam0").grade() == Grade::untrusted);
+}
+
 TEST_CASE("verify: a recording that begins and ends between a frame and its evidence") {
     Drive drive;
     CameraRun& run = drive.camera(0).runs[0];

@@ -23,6 +23,9 @@ namespace {
 
 using nlohmann::json;
 
+/// Two or three departing ones fit into a minute, whenever they begin.
+constexpr Duration live_stretch = seconds(15);
+
 /// Rotations over this time are compared: shorter ones show less of the motion, and cost more.
 constexpr Duration least_interval = milliseconds(90);
 
@@ -132,7 +135,7 @@ class LiveCamera {
     const std::optional<Camchain>& camchain_;
     std::optional<FeatureRotation> tracker_;
     std::optional<OffsetWatch> watch_;
-    PictureComparison comparison_;
+    PictureComparison comparison_{live_stretch};
     OutputTime followed_;  ///< the last frame that was compared
     OutputTime latest_;
     bool departed_ = false;

@@ -9,8 +9,8 @@ namespace versavis::client {
 
 namespace {
 
-// One offset is found from so much: a few of them in a minute, and 400 rotations at 20 Hz.
-constexpr Duration stretch = seconds(20);
+// One offset of a recording is found from so much: 400 rotations at 20 Hz.
+constexpr Duration recorded_stretch = seconds(20);
 
 // Offsets within +- this are tried. What is further off is found by other witnesses.
 constexpr Duration offset_range = milliseconds(100);
@@ -33,13 +33,13 @@ void PictureComparison::add(const GyroSample& sample) {
 }
 
 void PictureComparison::add(const FrameRotation& rotation) {
-    const bool within = rotations_.empty() || rotation.to <= rotations_.front().from + stretch;
+    const bool within = rotations_.empty() || rotation.to <= rotations_.front().from + stretch_;
     (within && next_.empty() ? rotations_ : next_).push_back(rotation);
 }
 
 std::optional<StretchComparison> PictureComparison::take() {
     if (rotations_.empty()) return std::nullopt;
-    const OutputTime to = rotations_.front().from + stretch;
+    const OutputTime to = rotations_.front().from + stretch_;
     const auto gyro_since = [&](OutputTime time) {
         return !gyro_.empty() && gyro_.back().time >= time;
     };
@@ -54,13 +54,13 @@ std::optional<StretchComparison> PictureComparison::finish() {
     // The last frame of a stretch is hardly at its very end.
     constexpr Duration rest = seconds(1);
     const bool whole =
-        !rotations_.empty() && rotations_.back().to >= rotations_.front().from + stretch - rest;
+        !rotations_.empty() && rotations_.back().to >= rotations_.front().from + stretch_ - rest;
     return whole ? std::optional(compare()) : std::nullopt;
 }
 
 StretchComparison PictureComparison::compare() {
     const OutputTime from = rotations_.front().from;
-    const OutputTime to = from + stretch;
+    const OutputTime to = from + stretch_;
     const auto end = std::find_if(gyro_.begin(), gyro_.end(), [&](const GyroSample& sample) {
         return sample.time >= to + margin;
     });
@@ -73,14 +73,14 @@ StretchComparison PictureComparison::compare() {
         PictureOffset{from, to, duration_of(found->offset_s), duration_of(found->offset_sigma_s)}};
 }
 
-void PictureComparison::restart() { *this = {}; }
+void PictureComparison::restart() { *this = PictureComparison(stretch_); }
 
 std::vector<PictureOffset> picture_offsets(const SeenMotion& motion) {
     std::vector<PictureOffset> offsets;
     const auto keep = [&](const std::optional<StretchComparison>& stretch) {
         if (stretch && stretch->offset) offsets.push_back(*stretch->offset);
     };
-    PictureComparison comparison;
+    PictureComparison comparison(recorded_stretch);
     auto sample = motion.gyro.begin();
     const auto add_samples = [&](OutputTime to) {
         for (; sample != motion.gyro.end() && sample->time <= to; ++sample) comparison.add(*sample);

@@ -11,7 +11,7 @@
 
 namespace versavis::client {
 
-/// What a stretch of 20 s shows.
+/// What a stretch of time shows.
 struct StretchComparison {
     OutputTime from;
     OutputTime to;
@@ -22,6 +22,8 @@ struct StretchComparison {
 /// both go on; holds no more than it needs for one. Used by one thread.
 class PictureComparison {
  public:
+    explicit PictureComparison(Duration stretch) : stretch_(stretch) {}
+
     /// In the order of time each; the gyro may be ahead.
     void add(const GyroSample& sample);
     void add(const FrameRotation& rotation);
@@ -38,6 +40,7 @@ class PictureComparison {
  private:
     StretchComparison compare();
 
+    Duration stretch_;
     std::vector<FrameRotation> rotations_;  ///< of the stretch
     std::vector<FrameRotation> next_;       ///< after it
     std::deque<GyroSample> gyro_;

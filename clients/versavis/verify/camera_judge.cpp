@@ -233,17 +233,18 @@ void CameraJudge::judge_run(std::size_t run) {
     for (Claim* claim : claims) claim->add(Finding::no_start);
 }
 
-/// A camera numbers every trigger, or those that it took. It may also take frames of its own, which
-/// only its clock distinguishes from frames of later triggers.
+/// A camera numbers every trigger, or those that it took. It may also take frames of its own, or
+/// begin to count anew: only its clock distinguishes these from frames of other triggers.
 void CameraJudge::judge_steps(const std::vector<Claim*>& claims) const {
     for (std::size_t i = 1; i < claims.size(); ++i) {
         const FrameMetadata& last = claims[i - 1]->frame->frame;
         const FrameMetadata& frame = claims[i]->frame->frame;
-        const bool by_clock =
-            claims[i - 1]->arrival->camera.ns != 0 && claims[i]->arrival->camera.ns != 0;
-        const bool more = frame.block_id - last.block_id > frame.trigger - last.trigger;
-        if (frame.block_id <= last.block_id || (more && !by_clock))
-            claims[i]->add(Finding::block_step);
+        const CameraTime before = claims[i - 1]->arrival->camera;
+        const CameraTime now = claims[i]->arrival->camera;
+        const bool by_clock = before.ns != 0 && now.ns != 0 && before != now;
+        const bool more = frame.block_id <= last.block_id ||
+                          frame.block_id - last.block_id > frame.trigger - last.trigger;
+        if (more && !by_clock) claims[i]->add(Finding::block_step);
     }
 }
 
