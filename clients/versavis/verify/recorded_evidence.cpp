@@ -93,6 +93,12 @@ void add_camera_evidence(const ItemFields& item, CameraEvidence& camera) {
                 newest_run(camera).arrivals.push_back(each);
             break;
         }
+        case 6: {  // of the board, too: it counts anew
+            const CameraRun& before = newest_run(camera);
+            if (item.at<std::uint8_t>(8) != 0)
+                camera.runs.push_back({before.period, before.latest_arrival, {}, {}, {}});
+            break;
+        }
         case 9: {
             constexpr unsigned both_edges = 1;
             const ExposureRecord record{item.u64(16),
