@@ -123,7 +123,6 @@ TEST_CASE("directory: a service without standard input locks as well, and lets g
     {
         auto owner = OwnedDirectory::claim(path);
         REQUIRE(owner);
-        CHECK(::fcntl(0, F_GETFD) >= 0);
         CHECK_FALSE(OwnedDirectory::claim(path));
     }
     CHECK(::fcntl(0, F_GETFD) < 0);
@@ -149,9 +148,37 @@ TEST_CASE("directory: one that cannot be made, or not locked, says why") {
     CHECK_THAT(OwnedDirectory::claim("/proc/instance").error().message(),
                Catch::Contains("cannot be created"));
     const auto path = parent.path() / "instance";
-    std::filesystem::create_directories(path / ".lock");
-    std::filesystem::permissions(path, std::filesystem::perms(0750));
-    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("cannot be locked"));
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto lock = path / ".lock";
+    const auto refusal = [&] { return OwnedDirectory::claim(path).error().message(); };
+    std::filesystem::remove(lock);
+    std::filesystem::create_directory(lock);
+    CHECK_THAT(refusal(), Catch::Contains("/.lock: cannot be opened: Is a directory; remove it"));
+    std::filesystem::remove(lock);
+    REQUIRE(::mkfifo(lock.c_str(), 0600) == 0);
+    CHECK_THAT(refusal(), Catch::Contains("/.lock: is not a file") && Catch::Contains("remove it"));
+}
+
+TEST_CASE("directory: nothing is locked or made behind a link with the lock's name") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    const auto elsewhere = parent.path() / "elsewhere";
+    REQUIRE(OwnedDirectory::claim(path));
+    std::filesystem::remove(path / ".lock");
+    std::filesystem::create_symlink(elsewhere, path / ".lock");
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+               Catch::Contains("/.lock: is a link") && Catch::Contains("remove it"));
+    CHECK_FALSE(std::filesystem::exists(elsewhere));
+}
+
+TEST_CASE("directory: another user's lock is refused, and named") {
+    if (::geteuid() != 0) return;  // only root can give files away
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    REQUIRE(::chown((path / ".lock").c_str(), 12345, 12345) == 0);
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+               Catch::Contains("/.lock: belongs to another user (uid 12345); remove it"));
 }
 
 TEST_CASE("directory: whom readers shall believe does not keep its owner out") {

@@ -27,11 +27,22 @@ namespace {
 constexpr auto lock_name = ".lock";
 
 /// Nobody else can put a ring there or take one away, from there or with the whole directory.
-Expected<> check_trust(const std::filesystem::path& path) {
+std::string errno_text() { return std::generic_category().message(errno); }
+
+/// The directory itself: no link to another one is followed.
+Expected<FileDescriptor> open_directory(const std::filesystem::path& path) {
+    FileDescriptor directory(::open(path.c_str(), O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (directory) return directory;
+    if (errno == ENOTDIR || errno == ELOOP)
+        return failure(path.string(), "is not a directory", "remove it");
+    return failure(path.string(), fmt::format("cannot be opened: {}", errno_text()),
+                   "run the service as the user that owns it");
+}
+
+Expected<> check_trust(const FileDescriptor& opened, const std::filesystem::path& path) {
     struct stat directory {};
     struct stat parent {};
-    if (::lstat(path.c_str(), &directory) != 0 || !S_ISDIR(directory.st_mode))
-        return failure(path.string(), "is not a directory", "remove it");
+    ::fstat(opened.get(), &directory);
     if (directory.st_uid != ::geteuid())
         return failure(path.string(),
                        fmt::format("belongs to another user (uid {})", directory.st_uid),
@@ -70,6 +81,27 @@ std::uint32_t living_writer(const std::filesystem::path& directory) {
     for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
         const auto constants = constants_of(entry.path());
         if (!constants || is_own(*constants)) continue;
+/// The file that is locked. It is made if needed; whatever else has its name is refused, so that
+/// neither a link nor another user's file is written to.
+Expected<FileDescriptor> open_lock(const FileDescriptor& directory,
+                                   const std::filesystem::path& path) {
+    const auto file = (path / lock_name).string();
+    FileDescriptor lock(::openat(directory.get(), lock_name,
+                                 O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600));
+    struct stat found {};
+    if (!lock && errno == ELOOP)
+        return failure(file, "is a link, not the lock of a service", "remove it");
+    if (!lock || ::fstat(lock.get(), &found) != 0)
+        return failure(file, fmt::format("cannot be opened: {}", errno_text()),
+                       "remove it, or run the service as the user that owns it");
+    if (!S_ISREG(found.st_mode))
+        return failure(file, "is not a file, as the lock of a service is", "remove it");
+    if (found.st_uid != ::geteuid())
+        return failure(file, fmt::format("belongs to another user (uid {})", found.st_uid),
+                       "remove it, or run the service as that user");
+    return lock;
+}
+
         const std::uint64_t start = start_ticks_of(constants->writer_pid);
         if (start != 0 && start == constants->writer_start_ticks) return constants->writer_pid;
     }
@@ -95,14 +127,13 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     if (error)
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
-    if (auto trusted = check_trust(path); !trusted) return Unexpected(trusted.error());
-    FileDescriptor lock(::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600));
-    if (!lock)
-        return failure(path.string(),
-                       fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
-                       "run the service as the user that owns it");
-    if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return served(path, living_writer(path));
-    OwnedDirectory owned(path, std::move(lock));
+    const auto directory = open_directory(path);
+    if (!directory) return Unexpected(directory.error());
+    if (auto trusted = check_trust(*directory, path); !trusted) return Unexpected(trusted.error());
+    auto lock = open_lock(*directory, path);
+    if (!lock) return Unexpected(lock.error());
+    if (::flock(lock->get(), LOCK_EX | LOCK_NB) != 0) return served(path, living_writer(path));
+    OwnedDirectory owned(path, std::move(*lock));
     if (const std::uint32_t process = living_writer(path); process != 0)
         return served(path, process);
     return owned;
