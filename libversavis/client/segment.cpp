@@ -30,6 +30,7 @@ struct OpenFile {
 constexpr std::uint32_t minor_with_life = 5;
 constexpr std::uint32_t minor_with_attributes = 6;
 
+constexpr std::uint32_t minor_with_time_namespace = 8;
 bool inside(std::uint64_t at, std::uint64_t count, std::uint64_t size, std::uint64_t total) {
     return at <= total && (size == 0 || count <= (total - at) / size);
 }
@@ -134,3 +135,5 @@ FileId file_id(const std::filesystem::path& path) {
 }
 
 }  // namespace versavis::ring
+    constants_.time_namespace =
+        from.abi_minor >= minor_with_time_namespace ? from.time_namespace : 0;

@@ -32,6 +32,7 @@ struct Constants {
     std::array<char, sizeof Header::name> name;
     std::uint64_t life;
     std::uint64_t pid_namespace;
+    std::uint64_t time_namespace;
     bool has_attributes;  ///< its slots have
 };
 

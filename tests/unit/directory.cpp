@@ -7,12 +7,15 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "../support/in_process.hpp"
@@ -20,6 +23,7 @@
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring_reader.hpp"
+#include "versavis/time.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -67,6 +71,71 @@ TEST_CASE("directory: another service is found by its rings, too, and named") {
     ::waitpid(service, nullptr, 0);
     CHECK(OwnedDirectory::claim(path));
     for (const int end : ready) ::close(end);
+}
+
+namespace {
+
+/// Beats on the clock of the process whose it is, as long as this lives.
+class BeatingHeart {
+ public:
+    explicit BeatingHeart(Header& header)
+        : thread_([this, &header] {
+              while (!stop_) {
+                  header.heartbeat_ns.fetch_add(50'000'000);
+                  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+              }
+          }) {}
+    ~BeatingHeart() {
+        stop_ = true;
+        thread_.join();
+    }
+    BeatingHeart(const BeatingHeart&) = delete;
+    BeatingHeart& operator=(const BeatingHeart&) = delete;
+
+ private:
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace
+
+TEST_CASE("directory: a service that only its heart shows is found, too") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+    REQUIRE(writer);
+    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
+    Header& header = segment->header();
+    SECTION("of another pid namespace") { ++header.pid_namespace; }
+    SECTION("of another time namespace, whose clock is far off") {
+        ++header.time_namespace;
+        header.heartbeat_ns = (host_now() - seconds(500)).ns;
+    }
+    {
+        const BeatingHeart heart(header);
+        CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+                   Catch::Contains("serves this instance (process"));
+    }
+    CHECK(OwnedDirectory::claim(path));  // it died a moment ago
+    header.state = static_cast<std::uint32_t>(WriterState::closed);
+    const HostTime begun = host_now();
+    CHECK(OwnedDirectory::claim(path));
+    CHECK(host_now() - begun < seconds(1));
+}
+
+TEST_CASE("directory: a heart that stopped long ago holds nobody up") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+    REQUIRE(writer);
+    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
+    ++segment->header().pid_namespace;
+    segment->header().heartbeat_ns = (host_now() - seconds(4)).ns;
+    const HostTime begun = host_now();
+    CHECK(OwnedDirectory::claim(path));
+    CHECK(host_now() - begun < seconds(1));
 }
 
 namespace {

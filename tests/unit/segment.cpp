@@ -122,12 +122,13 @@ TEST_CASE_METHOD(Copies, "segment: what its header says is read once") {
     CHECK(constants.pid_namespace == header.pid_namespace);
     ++header.generation;
     CHECK(constants.generation == generation);
+        CHECK((mapping->constants().time_namespace != 0) == (minor >= 8));
 }
 
 TEST_CASE_METHOD(Copies,
-                 "segment: one that is older than life, namespace and attributes has none") {
+                 "segment: one that is older than life, namespaces and attributes has none") {
     const auto path = directory.path() / "changed";
-    for (const std::uint32_t minor : {4U, 5U, 6U, 7U}) {
+    for (const std::uint32_t minor : {4U, 5U, 6U, 7U, 8U}) {
         changed(offsetof(Header, abi_minor), minor);
         const auto mapping = Mapping::open(path, Mapping::Access::read_only);
         REQUIRE(mapping);

@@ -16,6 +16,7 @@
 #include "client/process.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
+#include "engine/ring/foreign_segments.hpp"
 #include "engine/ring/segment_lifecycle.hpp"
 
 namespace versavis::ring {
@@ -26,7 +27,6 @@ namespace {
 // file.
 constexpr auto lock_name = ".lock";
 
-/// Nobody else can put a ring there or take one away, from there or with the whole directory.
 std::string errno_text() { return std::generic_category().message(errno); }
 
 /// The directory itself: no link to another one is followed.
@@ -39,6 +39,7 @@ Expected<FileDescriptor> open_directory(const std::filesystem::path& path) {
                    "run the service as the user that owns it");
 }
 
+/// Nobody else can put a ring there or take one away, from there or with the whole directory.
 Expected<> check_trust(const FileDescriptor& opened, const std::filesystem::path& path) {
     struct stat directory {};
     struct stat parent {};
@@ -65,22 +66,21 @@ Expected<> check_trust(const FileDescriptor& opened, const std::filesystem::path
     return {};
 }
 
-/// None: it is no segment, or a sealed one whose process has ended.
-std::optional<Constants> constants_of(const std::filesystem::path& path) {
+/// Errors: it is no segment, or a sealed one whose process has ended.
+Expected<Mapping> open_segment(const std::filesystem::path& path) {
     const auto file = open_trusted(path, ::geteuid());
-    if (!file) return std::nullopt;
-    const auto segment = Mapping::open(*file, path, Mapping::Access::read_only);
-    if (!segment) return std::nullopt;
-    return segment->constants();
+    if (!file) return Unexpected(file.error());
+    return Mapping::open(*file, path, Mapping::Access::read_only);
 }
 
 /// Another process that writes a ring there; 0: none. It is found even when somebody has removed
 /// the file that it locked.
 std::uint32_t living_writer(const std::filesystem::path& directory) {
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
-        const auto constants = constants_of(entry.path());
-        if (!constants || is_own(*constants)) continue;
+    for (const ForeignSegment& segment : foreign_segments(directory, open_segment))
+        if (segment.alive) return segment.mapping.constants().writer_pid;
+    return 0;
+}
+
 /// The file that is locked. It is made if needed; whatever else has its name is refused, so that
 /// neither a link nor another user's file is written to.
 Expected<FileDescriptor> open_lock(const FileDescriptor& directory,
@@ -100,12 +100,6 @@ Expected<FileDescriptor> open_lock(const FileDescriptor& directory,
         return failure(file, fmt::format("belongs to another user (uid {})", found.st_uid),
                        "remove it, or run the service as that user");
     return lock;
-}
-
-        const std::uint64_t start = start_ticks_of(constants->writer_pid);
-        if (start != 0 && start == constants->writer_start_ticks) return constants->writer_pid;
-    }
-    return 0;
 }
 
 Unexpected<Error> served(const std::filesystem::path& path, std::uint32_t process) {
@@ -144,8 +138,8 @@ void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {
     for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
         const std::string name = entry.path().filename();
         if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
-        const auto constants = constants_of(entry.path());
-        if (constants && is_own(*constants)) continue;
+        const auto found = open_segment(entry.path());
+        if (found && is_own(found->constants())) continue;
         auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
         std::filesystem::remove(entry.path(), error);
         if (segment) end(segment->header());

@@ -165,7 +165,8 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.slots_at =
         round_up(header.generations_at + shape.slot_count * generation_stride, page_size);
     shape.name.copy(header.name, sizeof header.name);
-    header.pid_namespace = own_pid_namespace();
+    header.pid_namespace = own_namespaces().pid;
+    header.time_namespace = own_namespaces().time;
     header.life = shape.life != 0 ? shape.life : life_of(header);
     header.head.store(shape.first_item, std::memory_order_relaxed);
     header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
