@@ -133,11 +133,14 @@ class VERSAVIS_API Reader {
     Received look();
     Received lapped();
     Received hand_over();
+    Received gone();
+    bool not_there() const;
+    void let_go();
     Received settle();
     bool writer_seen();
     bool ready();
     std::optional<HostTime> retry() const;
-    FutexWord wake_word() const;
+    FutexWord wake_word();
     WatchTarget target(std::uint32_t seen) const;
 
     std::filesystem::path path_;
