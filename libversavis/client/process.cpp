@@ -26,7 +26,7 @@ constexpr std::int64_t doubtful_ns = 100'000'000;
 
 bool can_be_judged(const Constants& constants) {
     return constants.writer_pid != 0 && constants.writer_pid <= INT_MAX &&
-           constants.pid_namespace != 0 && constants.pid_namespace == own_pid_namespace();
+           constants.pid_namespace != 0 && constants.pid_namespace == own_namespaces().pid;
 }
 
 /// Empty: there is no such process, or it cannot be read.
@@ -35,6 +35,12 @@ std::string stat_of(std::uint32_t pid) {
     std::string line;
     std::getline(stat, line);
     return line;
+}
+
+/// 0: there is no such file.
+std::uint64_t inode(const char* path) {
+    struct stat file {};
+    return ::stat(path, &file) == 0 ? file.st_ino : 0;
 }
 
 /// 0: only the remains of a process.
@@ -58,7 +64,9 @@ Liveness liveness(const Constants& constants) {
     if (const Liveness quick = quick_liveness(constants); quick != Liveness::alive) return quick;
     const std::string line = stat_of(constants.writer_pid);
     if (line.empty()) return Liveness::unknown;  // /proc may hide other users' processes
-    return start_in(line) == constants.writer_start_ticks ? Liveness::alive : Liveness::dead;
+    const std::uint64_t start = start_in(line);
+    if (start != 0 && constants.time_namespace != own_namespaces().time) return Liveness::unknown;
+    return start == constants.writer_start_ticks ? Liveness::alive : Liveness::dead;
 }
 
 std::uint64_t start_ticks_of(std::uint32_t pid) { return start_in(stat_of(pid)); }
@@ -67,14 +75,13 @@ std::uint64_t start_ticks_of_this_process() {
     return start_ticks_of(static_cast<std::uint32_t>(::getpid()));
 }
 
-std::uint64_t own_pid_namespace() {
+Namespaces own_namespaces() {
     // A process stays where it was born; a child may be born elsewhere. Asking the kernel takes
-    // 5 us, and readers ask between waking up and handing over an item.
+    // 5 us each, and readers ask between waking up and handing over an item.
     thread_local pid_t process = 0;
-    thread_local std::uint64_t known = 0;
+    thread_local Namespaces known{};
     if (const pid_t now = ::getpid(); now != process) {
-        struct stat space {};
-        known = ::stat("/proc/self/ns/pid", &space) == 0 ? space.st_ino : 0;
+        known = {inode("/proc/self/ns/pid"), inode("/proc/self/ns/time")};
         process = now;
     }
     return known;
@@ -82,6 +89,8 @@ std::uint64_t own_pid_namespace() {
 
 bool is_own(const Constants& constants) {
     return constants.writer_pid == static_cast<std::uint32_t>(::getpid()) &&
+           constants.pid_namespace == own_namespaces().pid &&
+           constants.time_namespace == own_namespaces().time &&
            constants.writer_start_ticks == start_ticks_of_this_process();
 }
 

@@ -13,13 +13,15 @@ namespace versavis::ring {
 enum class Liveness {
     alive,
     dead,
-    unknown,  ///< it is of another pid namespace, or hidden from this process
+    unknown,  ///< it is of another pid or time namespace, or hidden from this process
 };
 
 /// By process id alone: one system call.
 Liveness quick_liveness(const Constants& constants);
 
 /// By process id and start time: detects zombies and a reused process id. Reads a file of /proc.
+/// Between time namespaces start times do not compare: there only a heartbeat shows that a process
+/// which is there is the writer.
 Liveness liveness(const Constants& constants);
 
 /// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process
@@ -27,10 +29,14 @@ Liveness liveness(const Constants& constants);
 std::uint64_t start_ticks_of(std::uint32_t pid);
 std::uint64_t start_ticks_of_this_process();
 
-/// Inode of this process's pid namespace; 0: unknown.
-std::uint64_t own_pid_namespace();
+/// Inodes of this process's namespaces; 0: unknown. Those of time exist since Linux 5.6.
+struct Namespaces {
+    std::uint64_t pid;
+    std::uint64_t time;
+};
+Namespaces own_namespaces();
 
-/// True when this process made the segment.
+/// True when this process made the segment. All that says so was its own then, namespaces included.
 bool is_own(const Constants& constants);
 
 /// Whether a writer updates its heartbeat: one reader asks repeatedly.

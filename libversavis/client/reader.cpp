@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "versavis/ring_reader.hpp"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <numeric>
 
 #include "client/clock_ns.hpp"
@@ -28,6 +32,14 @@ constexpr Duration retry_period = seconds(1);
 /// A few ns to read, and some ms coarse.
 std::int64_t coarse_now_ns() { return clock_ns(CLOCK_MONOTONIC_COARSE); }
 
+/// True when some of the file's pages are not there.
+bool has_holes(int file) {
+    struct stat status {};
+    if (::fstat(file, &status) != 0) return false;
+    const off_t hole = ::lseek(file, 0, SEEK_HOLE);
+    return hole >= 0 && hole < status.st_size;
+}
+
 Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                                              const Options& options) {
     auto file = open_trusted(path, options.owner);
@@ -37,7 +49,16 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                        "set 'sealed = true' in [memory] of the service's configuration");
     auto mapping = Mapping::open(*file, path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
-    mapping->populate();
+    // To read what a dead writer left needs no haste, and may take no memory: in a ring with holes,
+    // which older services made to get memory back, each page that is read would.
+    Pulse pulse;
+    if (writer_lives(*mapping, pulse)) {
+        if (auto populated = mapping->populate(path); !populated)
+            return Unexpected(populated.error());
+    } else if (has_holes(file->file.get())) {
+        return failure(path.string(), "its service died and its memory was taken back",
+                       "wait for the service to start");
+    }
     return std::make_shared<const Mapping>(std::move(*mapping));
 }
 
@@ -252,15 +273,38 @@ Received Reader::look() {
     return received;
 }
 
+bool Reader::not_there() const {
+    const auto& sequence = mapping_->descriptor(next_).sequence;
+    return ahead_of(next_, sequence.load(std::memory_order_acquire)) < 0;
+}
+
+/// Of a segment that has lost its name: whoever took it away may need the memory, and gets it when
+/// nobody has it mapped. Items that are held keep it mapped.
+void Reader::let_go() {
+    const FileId known = mapping_->name();
+    if (known == FileId{}) return;  // it has let go
+    const FileId now = file_id(path_);
+    if (now == known || (now == FileId{} && errno != ENOENT)) return;
+    // A writer considered dead may have published once more before the name was taken.
+    if (!not_there()) return;
+    if (auto left = mapping_->remains())
+        mapping_ = std::make_shared<const Mapping>(std::move(*left));
+}
+
+Received Reader::gone() {
+    let_go();
+    return pause(Pause::gone);
+}
+
 Received Reader::hand_over() {
-    if (!has_successor(path_, mapping_->name(), contact_->refused())) return pause(Pause::gone);
+    if (!has_successor(path_, mapping_->name(), contact_->refused())) return gone();
     contact_->refuse(file_id(path_));
     auto successor = map(path_, options_);
-    if (!successor) return pause(Pause::gone);
+    if (!successor) return gone();
     const Constants& now = (*successor)->constants();
     const Constants& before = mapping_->constants();
     // Of another kind it is another stream: its items would be read as what they are not.
-    if (now.generation == before.generation || now.kind != before.kind) return pause(Pause::gone);
+    if (now.generation == before.generation || now.kind != before.kind) return gone();
     // A writer considered dead may have published once more before it was replaced.
     auto last = take();
     if (!is(last, Pause::nothing)) return last;
@@ -291,7 +335,10 @@ Received Reader::settle() {
     return received;
 }
 
-FutexWord Reader::wake_word() const {
+/// Where to sleep, before a look for items. One that sleeps for a successor lets go of what is left
+/// of its writer first.
+FutexWord Reader::wake_word() {
+    if (contact_->reported_gone) let_go();
     const auto& wake = mapping_->header().wake;
     // SYNC 5: acquire here, release in Writer::write_descriptor() and wake_readers(): whatever
     // moved `wake` to the value seen is visible to the look that follows; whatever comes later
@@ -306,10 +353,6 @@ WatchTarget Reader::target(std::uint32_t seen) const {
 
 /// True when next() has something new to return.
 bool Reader::ready() {
-    const auto not_there = [this] {
-        const auto& sequence = mapping_->descriptor(next_).sequence;
-        return ahead_of(next_, sequence.load(std::memory_order_acquire)) < 0;
-    };
     if (!not_there()) return true;
     if (writer_seen()) return false;
     if (!contact_->reported_gone || !not_there()) return true;
@@ -328,8 +371,8 @@ Expected<int> Reader::fd() {
 Received Reader::next(Duration timeout) {
     const HostTime deadline = deadline_after(timeout);
     for (;;) {
-        const auto mapping = mapping_;  // a successor may take its place
         const FutexWord word = wake_word();
+        const auto mapping = mapping_;  // a successor may take its place
         const bool reported = contact_->reported_gone;
         auto received = next();
         const bool ends = contact_->reported_gone && !reported;

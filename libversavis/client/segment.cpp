@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
+#include <boost/interprocess/anonymous_shared_memory.hpp>
 #include <boost/interprocess/exceptions.hpp>
 #include <cerrno>
 #include <cstring>
@@ -29,6 +30,7 @@ struct OpenFile {
 /// Older segments have nothing there.
 constexpr std::uint32_t minor_with_life = 5;
 constexpr std::uint32_t minor_with_attributes = 6;
+constexpr std::uint32_t minor_with_time_namespace = 8;
 
 bool inside(std::uint64_t at, std::uint64_t count, std::uint64_t size, std::uint64_t total) {
     return at <= total && (size == 0 || count <= (total - at) / size);
@@ -101,12 +103,41 @@ Expected<Mapping> Mapping::open(const NamedFile& file, const std::filesystem::pa
     return mapping;
 }
 
-void Mapping::populate() const {
+Expected<> Mapping::populate(const std::filesystem::path& path) const {
     const int how = region_.get_mode() == ipc::read_only ? MADV_POPULATE_READ : MADV_POPULATE_WRITE;
-    if (::madvise(bytes(), size(), how) == 0) return;
-    // Linux before 5.14 cannot.
+    if (::madvise(bytes(), size(), how) == 0) return {};
+    // Linux before 5.14 cannot. For any other reason, touching a page may end the process.
+    if (errno != EINVAL)
+        return failure(path.string(),
+                       "its memory cannot be mapped: " +
+                           std::error_code(errno, std::generic_category()).message(),
+                       "free memory: 'df /dev/shm' and 'free' show what there is");
     const volatile std::byte* page = bytes();
     for (std::size_t at = 0; at < size(); at += page_size) static_cast<void>(page[at]);
+    return {};
+}
+
+Expected<Mapping> Mapping::remains() const {
+    Mapping left;
+    try {
+        left.region_ = ipc::anonymous_shared_memory(2 * page_size);
+    } catch (const ipc::interprocess_exception& exception) {
+        return failure(constants_.name.data(), exception.what());
+    }
+    left.constants_ = constants_;
+    left.constants_.descriptors_at = page_size;
+    left.constants_.descriptor_count = 1;
+    left.constants_.slot_count = 0;
+    const Header& last = header();
+    Header& copy = left.header();
+    const std::uint64_t head = last.head.load(std::memory_order_acquire);
+    copy.head = head;
+    copy.wake = last.wake.load(std::memory_order_relaxed);
+    copy.heartbeat_ns = last.heartbeat_ns.load(std::memory_order_relaxed);
+    copy.state = static_cast<std::uint32_t>(WriterState::closed);
+    // By this, the next item is not there, and those before it are lost.
+    left.descriptor(0).sequence = 2 * head - 1;
+    return left;
 }
 
 void Mapping::read_constants() {
@@ -125,6 +156,8 @@ void Mapping::read_constants() {
     std::memcpy(constants_.name.data(), from.name, sizeof from.name);
     constants_.life = from.abi_minor >= minor_with_life ? from.life : 0;
     constants_.pid_namespace = from.abi_minor >= minor_with_life ? from.pid_namespace : 0;
+    constants_.time_namespace =
+        from.abi_minor >= minor_with_time_namespace ? from.time_namespace : 0;
     constants_.has_attributes = from.abi_minor >= minor_with_attributes;
 }
 

@@ -32,6 +32,7 @@ struct Constants {
     std::array<char, sizeof Header::name> name;
     std::uint64_t life;
     std::uint64_t pid_namespace;
+    std::uint64_t time_namespace;
     bool has_attributes;  ///< its slots have
 };
 
@@ -65,8 +66,13 @@ class Mapping {
     static Expected<Mapping> open_unchecked(int file, const std::filesystem::path& path,
                                             Access access);
 
-    /// Has all pages at hand, so that none is waited for when it is first touched.
-    void populate() const;
+    /// Has all pages at hand, so that none is waited for when it is first touched. `path` is for
+    /// messages. Errors: the memory for them is not there.
+    Expected<> populate(const std::filesystem::path& path) const;
+
+    /// What stays for a reader that lets go of a segment: its constants, the last words of its
+    /// header and no item, in memory of its own, closed, and without a name. Errors: no memory.
+    Expected<Mapping> remains() const;
 
     Header& header() const { return *static_cast<Header*>(region_.get_address()); }
     const Constants& constants() const { return constants_; }

@@ -8,8 +8,11 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
+#include <fstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -21,13 +24,51 @@ namespace {
 
 constexpr auto service_user = "versavis";
 
+/// Users of containers often have no name. No name consists of digits alone.
+std::optional<std::uint32_t> number_in(std::string_view text) {
+    std::uint32_t number{};
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, number);
+    return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
+}
+
 std::optional<std::uint32_t> user_id(const char* name) {
+    if (std::string_view(name).find_first_not_of("0123456789") == std::string_view::npos)
+        return number_in(name);
     passwd entry{};
     passwd* found = nullptr;
     std::array<char, 4096> text{};
     if (::getpwnam_r(name, &entry, text.data(), text.size(), &found) != 0 || found == nullptr)
         return std::nullopt;
     return found->pw_uid;
+}
+
+/// The kernel's name for users whom a user namespace does not map.
+constexpr std::uint32_t unmapped_user = 65534;
+
+/// True where all users are mapped, each to itself.
+bool maps_all_users() {
+    std::ifstream map("/proc/self/uid_map");
+    std::uint64_t inside{};
+    std::uint64_t outside{};
+    std::uint64_t count{};
+    return !(map >> inside >> outside >> count) ||
+           (inside == 0 && outside == 0 && count == UINT32_MAX);
+}
+
+Unexpected<> not_trusted(const std::filesystem::path& path, std::uint32_t user,
+                         std::optional<std::uint32_t> owner) {
+    if (user == unmapped_user && !maps_all_users())
+        return failure(path.string(), "belongs to a user that this container does not map",
+                       "map the service's user in it; or, if all users outside are trusted, set "
+                       "VERSAVIS_OWNER=" +
+                           std::to_string(unmapped_user));
+    return failure(path.string(),
+                   "belongs to user " + std::to_string(user) +
+                       (owner ? ", not to user " + std::to_string(*owner)
+                              : ", who is neither root, nor you, nor 'versavis'"),
+                   "if the service runs as that user, give its name or number in VERSAVIS_OWNER, "
+                   "or as owner");
 }
 
 Unexpected<> not_opened(const std::filesystem::path& path) {
@@ -69,12 +110,7 @@ Expected<NamedFile> open_trusted(const std::filesystem::path& path,
     if (of_file.st_uid != of_directory.st_uid || (of_directory.st_mode & S_IWOTH) != 0)
         return failure(path.string(), "does not belong to the owner of its directory",
                        "somebody else may have put it there: remove it");
-    if (!may_own(of_file.st_uid, owner))
-        return failure(path.string(),
-                       "belongs to user " + std::to_string(of_file.st_uid) +
-                           (owner ? ", not to user " + std::to_string(*owner)
-                                  : ", who is neither root, nor you, nor 'versavis'"),
-                       "if the service runs as that user, name it in VERSAVIS_OWNER, or as owner");
+    if (!may_own(of_file.st_uid, owner)) return not_trusted(path, of_file.st_uid, owner);
     const FileId id{of_file.st_dev, of_file.st_ino};
     if (!sealed) return NamedFile{std::move(file), id};
     auto segment = fetch_sealed(file.get(), path, of_file.st_uid);

@@ -11,8 +11,8 @@
 
 namespace versavis::ring {
 
-/// Who may own streams: `named`; or root, this process's user, that of the name in
-/// $VERSAVIS_OWNER, or `versavis`.
+/// Who may own streams: `named`; or the user whose name or number is in $VERSAVIS_OWNER; without it
+/// root, this process's user, or `versavis`.
 bool may_own(std::uint32_t user, std::optional<std::uint32_t> named);
 
 /// A sealed segment is fetched from the socket that has its name. Errors: not there, no permission,

@@ -51,7 +51,7 @@ std::optional<std::size_t> WaitSet::wait(Duration timeout) {
     for (;;) {
         if (state_->watch) state_->watch->calm();
         state_->words.clear();
-        for (const ring::Reader* reader : readers) state_->words.push_back(reader->wake_word());
+        for (ring::Reader* reader : readers) state_->words.push_back(reader->wake_word());
         if (const auto found = ready()) {
             if (state_->watch) state_->watch->signal();
             return found;

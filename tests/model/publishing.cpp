@@ -166,15 +166,6 @@ class SlotWriter {
         program_.add(ring_.generations + slot, 1, twist_.order("abandoned relaxed", release));
         ++generations_[slot];
     }
-    /// Of a dead writer, by its successor: the pages read as zeros from then on.
-    void take_back(int slot) {
-        if (!twist_("memory freed before the generation"))
-            program_.add(ring_.generations + slot, 2, relaxed);
-        if (!twist_("no release fence after taking back")) program_.fence(release);
-        for (int i = 0; i < 2; ++i) program_.store(ring_.payloads + 2 * slot + i, 0, relaxed);
-        if (twist_("memory freed before the generation"))
-            program_.add(ring_.generations + slot, 2, relaxed);
-    }
     const Program& program() const { return program_; }
 
  private:
@@ -301,16 +292,6 @@ void abandon(SlotWriter& writer) {
     writer.publish(0, 1);
 }
 
-void take_back(SlotWriter& writer) {
-    writer.acquire(0);
-    writer.fill(0, word_of(0));
-    writer.publish(0, 0);
-    writer.acquire(1);
-    writer.fill(1, word_of(1));
-    writer.take_back(0);
-    writer.take_back(1);
-}
-
 /// A header of two words. The file may be met before its name says that it is complete, or not.
 Model header(const Twist& twist, bool by_name) {
     Model model;
@@ -399,8 +380,6 @@ std::vector<Change> slot_changes() {
         {"slot-reuse", "odd generation after the payload", "SYNC 4", breaks},
         {"slot-reuse", "no acquire fence before the generation", "SYNC 4", breaks},
         {"slot-reuse", "no look at the generation after", "SYNC 4", breaks},
-        {"slot-take-back", "no release fence after taking back", "SYNC 4", breaks},
-        {"slot-take-back", "memory freed before the generation", "SYNC 4", breaks},
         {"slot-order-head", "no acquire fence before the generation", "SYNC 4", breaks},
         {"slot-order-head", "no release fence after the odd generation", "SYNC 4", breaks},
         {"slot-order", "even sequence relaxed", "SYNC 2", breaks},
@@ -433,7 +412,6 @@ Collection publishing() {
         slot_subject("slot-order-head", "the same, read by head first", 2, 2, 3, out_of_order,
                      Reading::head),
         slot_subject("slot-abandon", "a slot is abandoned and used again", 2, 1, 2, abandon),
-        slot_subject("slot-take-back", "a dead writer's slots are taken back", 2, 2, 1, take_back),
         {"header", "a file is met while its header is filled",
          [](const Twist& twist) { return header(twist, false); }},
         {"header-by-name", "a file is met by its final name",

@@ -36,12 +36,30 @@ def opened(path):
     return descriptor
 
 
+def writer_is_dead(memory, minor):
+    """By its process alone, as far as that can be judged from here."""
+    (pid,) = unpack(memory, "I", 48)
+    (start,) = unpack(memory, "Q", 56)
+    pid_namespace, time_namespace = unpack(memory, "QQ", 176)
+    if minor < 5 or pid_namespace != os.stat("/proc/self/ns/pid").st_ino:
+        return False
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as stat_file:
+            fields = stat_file.read().rpartition(")")[2].split()  # from the third on
+    except FileNotFoundError:
+        return True
+    comparable = minor >= 8 and time_namespace == os.stat("/proc/self/ns/time").st_ino
+    return fields[0] == "Z" or (comparable and int(fields[19]) != start)
+
+
 def main(path, count):
     descriptor = opened(path)
     memory = mmap.mmap(descriptor, 0, prot=mmap.PROT_READ)
     magic, major, minor, total = unpack(memory, "8sIIQ", 0)
     if magic != b"VERSAVIS" or major != 1 or total != os.fstat(descriptor).st_size:
         sys.exit(f"{path}: not a ring of version 1")
+    if unpack(memory, "I", 512)[0] != 1 or writer_is_dead(memory, minor):
+        sys.exit(f"{path}: its writer is dead")
     descriptors, slots, slot_size = unpack(memory, "IIQ", 64)
     descriptors_at, generations_at, slots_at = unpack(memory, "QQQ", 80)
     number = unpack(memory, "Q", 256)[0]

@@ -7,12 +7,15 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "../support/in_process.hpp"
@@ -20,6 +23,7 @@
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring_reader.hpp"
+#include "versavis/time.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -67,6 +71,71 @@ TEST_CASE("directory: another service is found by its rings, too, and named") {
     ::waitpid(service, nullptr, 0);
     CHECK(OwnedDirectory::claim(path));
     for (const int end : ready) ::close(end);
+}
+
+namespace {
+
+/// Beats on the clock of the process whose it is, as long as this lives.
+class BeatingHeart {
+ public:
+    explicit BeatingHeart(Header& header)
+        : thread_([this, &header] {
+              while (!stop_) {
+                  header.heartbeat_ns.fetch_add(50'000'000);
+                  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+              }
+          }) {}
+    ~BeatingHeart() {
+        stop_ = true;
+        thread_.join();
+    }
+    BeatingHeart(const BeatingHeart&) = delete;
+    BeatingHeart& operator=(const BeatingHeart&) = delete;
+
+ private:
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace
+
+TEST_CASE("directory: a service that only its heart shows is found, too") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+    REQUIRE(writer);
+    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
+    Header& header = segment->header();
+    SECTION("of another pid namespace") { ++header.pid_namespace; }
+    SECTION("of another time namespace, whose clock is far off") {
+        ++header.time_namespace;
+        header.heartbeat_ns = (host_now() - seconds(500)).ns;
+    }
+    {
+        const BeatingHeart heart(header);
+        CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+                   Catch::Contains("serves this instance (process"));
+    }
+    CHECK(OwnedDirectory::claim(path));  // it died a moment ago
+    header.state = static_cast<std::uint32_t>(WriterState::closed);
+    const HostTime begun = host_now();
+    CHECK(OwnedDirectory::claim(path));
+    CHECK(host_now() - begun < seconds(1));
+}
+
+TEST_CASE("directory: a heart that stopped long ago holds nobody up") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+    REQUIRE(writer);
+    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
+    ++segment->header().pid_namespace;
+    segment->header().heartbeat_ns = (host_now() - seconds(4)).ns;
+    const HostTime begun = host_now();
+    CHECK(OwnedDirectory::claim(path));
+    CHECK(host_now() - begun < seconds(1));
 }
 
 namespace {
@@ -123,7 +192,6 @@ TEST_CASE("directory: a service without standard input locks as well, and lets g
     {
         auto owner = OwnedDirectory::claim(path);
         REQUIRE(owner);
-        CHECK(::fcntl(0, F_GETFD) >= 0);
         CHECK_FALSE(OwnedDirectory::claim(path));
     }
     CHECK(::fcntl(0, F_GETFD) < 0);
@@ -149,9 +217,37 @@ TEST_CASE("directory: one that cannot be made, or not locked, says why") {
     CHECK_THAT(OwnedDirectory::claim("/proc/instance").error().message(),
                Catch::Contains("cannot be created"));
     const auto path = parent.path() / "instance";
-    std::filesystem::create_directories(path / ".lock");
-    std::filesystem::permissions(path, std::filesystem::perms(0750));
-    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("cannot be locked"));
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto lock = path / ".lock";
+    const auto refusal = [&] { return OwnedDirectory::claim(path).error().message(); };
+    std::filesystem::remove(lock);
+    std::filesystem::create_directory(lock);
+    CHECK_THAT(refusal(), Catch::Contains("/.lock: cannot be opened: Is a directory; remove it"));
+    std::filesystem::remove(lock);
+    REQUIRE(::mkfifo(lock.c_str(), 0600) == 0);
+    CHECK_THAT(refusal(), Catch::Contains("/.lock: is not a file") && Catch::Contains("remove it"));
+}
+
+TEST_CASE("directory: nothing is locked or made behind a link with the lock's name") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    const auto elsewhere = parent.path() / "elsewhere";
+    REQUIRE(OwnedDirectory::claim(path));
+    std::filesystem::remove(path / ".lock");
+    std::filesystem::create_symlink(elsewhere, path / ".lock");
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+               Catch::Contains("/.lock: is a link") && Catch::Contains("remove it"));
+    CHECK_FALSE(std::filesystem::exists(elsewhere));
+}
+
+TEST_CASE("directory: another user's lock is refused, and named") {
+    if (::geteuid() != 0) return;  // only root can give files away
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    REQUIRE(::chown((path / ".lock").c_str(), 12345, 12345) == 0);
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+               Catch::Contains("/.lock: belongs to another user (uid 12345); remove it"));
 }
 
 TEST_CASE("directory: whom readers shall believe does not keep its owner out") {

@@ -9,6 +9,8 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cerrno>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "../support/in_process.hpp"
@@ -25,7 +27,8 @@ Constants own_constants() {
     Constants constants{};
     constants.writer_pid = static_cast<std::uint32_t>(::getpid());
     constants.writer_start_ticks = start_ticks_of_this_process();
-    constants.pid_namespace = own_pid_namespace();
+    constants.pid_namespace = own_namespaces().pid;
+    constants.time_namespace = own_namespaces().time;
     return constants;
 }
 
@@ -39,10 +42,16 @@ TEST_CASE("process: another one, or an earlier one with its number, did not make
     constants = own_constants();
     constants.writer_start_ticks = start_ticks_of(1);
     CHECK_FALSE(is_own(constants));
+    constants = own_constants();
+    ++constants.pid_namespace;
+    CHECK_FALSE(is_own(constants));
+    constants = own_constants();
+    ++constants.time_namespace;
+    CHECK_FALSE(is_own(constants));
 }
 
 TEST_CASE("process: it is there, dead, or cannot be judged from here") {
-    CHECK(own_pid_namespace() != 0);
+    CHECK(own_namespaces().pid != 0);
     CHECK(liveness(own_constants()) == Liveness::alive);
     Constants later = own_constants();
     ++later.writer_start_ticks;
@@ -61,12 +70,63 @@ TEST_CASE("process: it is there, dead, or cannot be judged from here") {
     CHECK(quick_liveness(none) == Liveness::alive);
     errno = ESRCH;  // of an earlier call
     CHECK(quick_liveness(later) == Liveness::alive);
-    for (const std::uint64_t space : {std::uint64_t{0}, own_pid_namespace() + 1}) {
+    for (const std::uint64_t space : {std::uint64_t{0}, own_namespaces().pid + 1}) {
         Constants elsewhere = later;
         elsewhere.pid_namespace = space;
         CHECK(quick_liveness(elsewhere) == Liveness::unknown);
         CHECK(liveness(elsewhere) == Liveness::unknown);
     }
+}
+
+TEST_CASE("process: its start says nothing in another time namespace") {
+    for (const std::uint64_t space : {std::uint64_t{0}, own_namespaces().time + 1}) {
+        Constants elsewhere = own_constants();
+        elsewhere.time_namespace = space;
+        CHECK(liveness(elsewhere) == Liveness::unknown);
+        ++elsewhere.writer_start_ticks;
+        CHECK(quick_liveness(elsewhere) == Liveness::alive);
+        CHECK(liveness(elsewhere) == Liveness::unknown);
+        elsewhere.writer_pid = 0x7FFFFFFF;
+        CHECK(liveness(elsewhere) == Liveness::dead);
+    }
+}
+
+namespace {
+
+/// The children of this process live 1000 s later from then on.
+bool shift_children_in_time() {
+    return ::unshare(CLONE_NEWTIME) == 0 &&
+           static_cast<bool>(std::ofstream("/proc/self/timens_offsets")
+                             << "monotonic 1000 0\nboottime 1000 0\n"
+                             << std::flush);
+}
+
+/// What a reader in another time namespace makes of a writer that only its heart shows to live.
+bool lives_across_time(const std::filesystem::path& path) {
+    const auto mapping = Mapping::open(path, Mapping::Access::read_write);
+    if (!mapping) return false;
+    const Constants& constants = mapping->constants();
+    ring::Pulse pulse;
+    writer_lives(*mapping, pulse);
+    mapping->header().heartbeat_ns.fetch_add(1);
+    return own_namespaces().time != constants.time_namespace &&
+           start_ticks_of(constants.writer_pid) != constants.writer_start_ticks &&
+           liveness(constants) == Liveness::unknown && writer_lives(*mapping, pulse);
+}
+
+}  // namespace
+
+TEST_CASE("process: a writer lives on for readers in another time namespace") {
+    if (!in_process(shift_children_in_time)) {
+        WARN("not tested: this machine lets nobody make a time namespace");
+        return;
+    }
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto writer = *Writer::create(directory.path(), {"events", StreamKind::events, 8});
+    CHECK(in_process([&] {
+        return shift_children_in_time() &&
+               in_process([&] { return lives_across_time(directory.path() / "events"); });
+    }));
 }
 
 TEST_CASE("process: one that may not be asked is there, and one that cannot be seen is unknown") {
@@ -80,7 +140,7 @@ TEST_CASE("process: one that may not be asked is there, and one that cannot be s
         return ::chroot(empty.path().c_str()) == 0 && liveness(seen) == Liveness::unknown;
     }));
     CHECK(in_process([&] {
-        if (::chroot(empty.path().c_str()) != 0 || own_pid_namespace() != 0) return false;
+        if (::chroot(empty.path().c_str()) != 0 || own_namespaces().pid != 0) return false;
         Constants unknown = own;
         unknown.pid_namespace = 0;  // as unknown as one's own
         return quick_liveness(unknown) == Liveness::unknown;
@@ -89,12 +149,12 @@ TEST_CASE("process: one that may not be asked is there, and one that cannot be s
 
 TEST_CASE("process: the first one of a container knows its namespace, too") {
     if (::geteuid() != 0) return;  // only root can make one
-    const std::uint64_t outside = own_pid_namespace();
+    const std::uint64_t outside = own_namespaces().pid;
     CHECK(in_process([&] {
         if (::unshare(CLONE_NEWPID) != 0) return true;  // nor may root everywhere
         return in_process([&] {
             std::uint64_t inside = 0;
-            std::thread([&] { inside = own_pid_namespace(); }).join();
+            std::thread([&] { inside = own_namespaces().pid; }).join();
             return ::getpid() == 1 && inside != 0 && inside != outside;
         });
     }));
@@ -185,6 +245,10 @@ TEST_CASE("process: a process that has ended is none, though its remains are the
     siginfo_t ended{};
     REQUIRE(::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) == 0);
     CHECK(start_ticks_of(static_cast<std::uint32_t>(child)) == 0);
+    Constants remains = own_constants();
+    remains.writer_pid = static_cast<std::uint32_t>(child);
+    ++remains.time_namespace;
+    CHECK(liveness(remains) == Liveness::dead);
     ::waitpid(child, nullptr, 0);
     CHECK(start_ticks_of(static_cast<std::uint32_t>(child)) == 0);
     ::close(gate[0]);

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <poll.h>
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -19,6 +25,7 @@
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring_reader.hpp"
+#include "versavis/wait_set.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -315,50 +322,149 @@ bool make_memory_tight() {
            ::mount("tmpfs", "/dev/shm", "tmpfs", 0, "size=3m,mode=0700") == 0;
 }
 
-/// In a small memory of its own: a dead writer's ring takes more than half of it.
-bool made_anew_in_tight_memory() {
-    const std::filesystem::path memory = "/dev/shm";
-    if (!make_memory_tight()) return false;
-    const Shape shape{"frames", StreamKind::frames, 8, 4, 512 << 10};
-    const bool left = in_process([&] {
-        auto writer = Writer::create(memory, shape);
+/// Of the 3 MiB, a ring of this shape takes more than half.
+const Shape large{"frames", StreamKind::frames, 8, 4, 512 << 10};
+
+/// A ring with three frames whose writer was killed.
+bool leave_dead(const std::filesystem::path& memory) {
+    return in_process([&] {
+        auto writer = Writer::create(memory, large);
         if (!writer) return false;
-        for (int i = 0; i < 3; ++i) writer->publish(*writer->acquire(), 1, {}, {});
+        for (std::uint8_t fill = 1; fill <= 3; ++fill) {
+            const auto slot = writer->acquire();
+            std::memset(writer->slot_data(*slot), fill, 512 << 10);
+            writer->publish(*slot, 512 << 10, OutputTime{}, {});
+        }
         ::_exit(0);  // without its destructor
     });
-    const auto path = memory / "frames";
-    auto reader = Reader::open(path, {Position::middle});
-    const auto dead = Mapping::open(path, Mapping::Access::read_only);
-    if (!left || !reader || !dead) return false;
+}
+
+bool is_whole(const test::Looked<Item>& item, std::uint8_t fill) {
+    const auto* bytes = item.payload.data();
+    return item.found == test::Found::item && item.payload.size() == 512 << 10 &&
+           std::all_of(bytes, bytes + item.payload.size(),
+                       [&](std::byte byte) { return byte == std::byte{fill}; }) &&
+           item.valid();
+}
+
+/// Takes all that is left, to the last page.
+bool fill_up(const std::filesystem::path& memory) {
+    std::ofstream file(memory / "filler");
+    const std::vector<char> page(page_size);
+    while (file.write(page.data(), page_size).flush()) continue;
+    struct statvfs system {};
+    return ::statvfs(memory.c_str(), &system) == 0 && system.f_bfree == 0;
+}
+
+/// Neither what is held nor what is mapped of a dead writer's ring is taken from its reader.
+bool held_stays_whole() {
+    const std::filesystem::path memory = "/dev/shm";
+    if (!make_memory_tight() || !leave_dead(memory)) return false;
+    auto reader = Reader::open(memory / "frames", {Position::oldest});
+    auto dead = Mapping::open(memory / "frames", Mapping::Access::read_only);
+    if (!reader || !dead) return false;
     std::vector<test::Looked<Item>> held;
     for (int i = 0; i < 2; ++i) held.push_back(test::look(reader->next()));
-    std::vector<std::uint64_t> before;
-    for (std::uint32_t slot = 0; slot < 4; ++slot) before.push_back(dead->generation(slot));
     const std::size_t files = open_files();
-    auto writer = Writer::create(memory, shape);
-    if (!writer || open_files() != files) return false;
-    for (const auto& item : held)
-        if (item.found != test::Found::item || item.valid()) return false;
-    for (std::uint32_t slot = 0; slot < 4; ++slot)
-        if (dead->generation(slot) != before[slot] + 2) return false;
+    const auto refused = Writer::create(memory, large);
+    const std::string text = refused ? "" : refused.error().message();
+    if (text.find("while programs still hold 3 MiB of a service that died") == text.npos ||
+        text.find(", or end those that read its streams") == text.npos || open_files() != files ||
+        std::filesystem::exists(memory / "frames") || !fill_up(memory))
+        return false;
+    const volatile auto* byte = reinterpret_cast<const std::byte*>(&dead->header());
+    for (std::size_t at = 0; at < dead->size(); at += page_size) static_cast<void>(byte[at]);
+    if (!is_whole(held[0], 1) || !is_whole(held[1], 2) || !held[1].stale) return false;
+    // What was not read yet is there, too.
+    if (!is_whole(test::look(reader->next()), 3)) return false;
+    if (test::look(reader->next()).found != test::Found::gone) return false;
+    std::filesystem::remove(memory / "filler");
+    dead = Unexpected(Error{});
+    held.pop_back();
+    if (Writer::create(memory, large) || !is_whole(held[0], 1)) return false;
+    held.clear();  // with the last of them, the memory
+    auto writer = Writer::create(memory, large);
+    if (!writer) return false;
     writer->publish(*writer->acquire(), 1, {}, {});
-    auto item = test::look(reader->next());
-    while (item.found == test::Found::lost) item = test::look(reader->next());
-    return item.found == test::Found::restarted &&
+    return test::look(reader->next()).found == test::Found::restarted &&
            test::look(reader->next()).found == test::Found::item;
+}
+
+/// Readers let go by themselves, however they wait.
+bool made_anew_in_tight_memory(const std::function<void(Reader&, const std::atomic<bool>&)>& wait) {
+    const std::filesystem::path memory = "/dev/shm";
+    if (!make_memory_tight() || !leave_dead(memory)) return false;
+    auto reader = Reader::open(memory / "frames");
+    if (!reader || test::look(reader->next()).found != test::Found::gone) return false;
+    std::atomic<bool> made{false};
+    std::thread waiting([&] { wait(*reader, made); });
+    auto writer = Writer::create(memory, large);
+    made = true;
+    waiting.join();
+    if (!writer) return false;
+    writer->publish(*writer->acquire(), 1, {}, {});
+    auto item = test::look(reader->next(seconds(5)));
+    if (item.found == test::Found::restarted) item = test::look(reader->next(seconds(5)));
+    return item.found == test::Found::item && !item.stale;
+}
+
+void wait_in_next(Reader& reader, const std::atomic<bool>&) {
+    static_cast<void>(reader.next(seconds(20)));
+}
+
+void wait_alone(Reader& reader, const std::atomic<bool>&) { reader.wait(seconds(20)); }
+
+void wait_in_set(Reader& reader, const std::atomic<bool>&) {
+    WaitSet set;
+    if (set.add(reader)) set.wait(seconds(20));
+}
+
+void wait_by_poll(Reader& reader, const std::atomic<bool>& made) {
+    const auto descriptor = reader.fd();
+    if (!descriptor) return;
+    while (!made) {
+        pollfd entry{*descriptor, POLLIN, 0};
+        ::poll(&entry, 1, 50);
+        if (entry.revents != 0) static_cast<void>(reader.next());
+    }
 }
 
 /// The ring of a dead writer that nobody makes anew, as that of a camera that is away.
 bool made_beside_the_dead() {
     const std::filesystem::path memory = "/dev/shm";
-    if (!make_memory_tight()) return false;
+    if (!make_memory_tight() || !leave_dead(memory)) return false;
     const bool left = in_process([&]() -> bool {
-        const auto writer = Writer::create(memory, {"frames", StreamKind::frames, 8, 4, 512 << 10});
+        const auto writer = Writer::create({memory, true}, {"sealed", StreamKind::events, 8});
         ::_exit(writer ? 0 : 1);
     });
     const auto own = Writer::create(memory, {"own", StreamKind::events, 8});
+    const auto served = Writer::create({memory, true}, {"served", StreamKind::events, 8});
     const auto other = Writer::create(memory, {"other", StreamKind::frames, 8, 4, 512 << 10});
-    return left && own && other && Reader::open(memory / "own")->writer_alive();
+    return left && own && served && other && Reader::open(memory / "own")->writer_alive() &&
+           Reader::open(memory / "served") && !std::filesystem::exists(memory / "sealed") &&
+           !std::filesystem::exists(memory / "frames");
+}
+
+/// A writer in another container, of which nothing shows that it lives but its heart.
+bool spares_whose_heart_beats() {
+    const std::filesystem::path memory = "/dev/shm";
+    if (!make_memory_tight() || !leave_dead(memory)) return false;
+    const auto segment = Mapping::open(memory / "frames", Mapping::Access::read_write);
+    if (!segment) return false;
+    Header& header = segment->header();
+    ++header.pid_namespace;
+    header.heartbeat_ns = host_now().ns;
+    std::atomic<bool> stop{false};
+    std::thread heart([&] {
+        for (; !stop; std::this_thread::sleep_for(std::chrono::milliseconds(50)))
+            header.heartbeat_ns = host_now().ns;
+    });
+    const auto refused = Writer::create(memory, {"other", StreamKind::frames, 8, 4, 512 << 10});
+    stop = true;
+    heart.join();
+    return !refused && refused.error().message().find("programs still hold") == std::string::npos &&
+           header.state == static_cast<std::uint32_t>(WriterState::live) &&
+           std::filesystem::exists(memory / "frames");
 }
 
 }  // namespace
@@ -386,8 +492,11 @@ TEST_CASE("ring: a dead writer's memory is used again where there is no other") 
         WARN("not tested: in a chroot no process can have a /dev/shm of its own");
         return;
     }
-    CHECK(in_process(made_anew_in_tight_memory));
+    CHECK(in_process(held_stays_whole));
     CHECK(in_process(made_beside_the_dead));
+    CHECK(in_process(spares_whose_heart_beats));
+    for (const auto wait : {wait_in_next, wait_alone, wait_in_set, wait_by_poll})
+        CHECK(in_process([&] { return made_anew_in_tight_memory(wait); }));
 }
 
 TEST_CASE_METHOD(Fixture, "ring: no item is lost when one writer follows another [threads]",

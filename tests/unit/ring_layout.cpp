@@ -83,11 +83,13 @@ TEST_CASE_METHOD(Ring, "ring_layout: the header of a ring with payloads") {
     const std::string file = bytes("frames");
     CHECK(file.substr(0, 8) == "VERSAVIS");
     CHECK(u32(file, 8) == 1);
-    CHECK(u32(file, 12) == 7);
+    CHECK(u32(file, 12) == 8);
     CHECK(u64(file, 168) != 0);
     struct stat space {};
     REQUIRE(::stat("/proc/self/ns/pid", &space) == 0);
     CHECK(u64(file, 176) == space.st_ino);
+    REQUIRE(::stat("/proc/self/ns/time", &space) == 0);
+    CHECK(u64(file, 184) == space.st_ino);
     CHECK(u64(file, 16) == file.size());
     CHECK(hexadecimal(file.substr(32, 16)) == boot_id());
     CHECK(u32(file, 48) == static_cast<std::uint32_t>(::getpid()));

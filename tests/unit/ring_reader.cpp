@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where a reader begins, what it makes of a writer that died, lied or took back, and how it waits.
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -419,23 +420,78 @@ TEST_CASE_METHOD(ReaderStreams, "ring_reader: a copy of a segment is no successo
     CHECK(test::look(reader.next()).found == test::Found::gone);
 }
 
-TEST_CASE_METHOD(ReaderStreams,
-                 "ring_reader: all that it may read is in memory from the beginning") {
-    const Writer writer = frames(64);
-    const Reader reader = open("frames");
+namespace {
+
+/// Of this process, of one file.
+struct Mapped {
+    int mappings = 0;
+    int in_memory = 0;  ///< how many of them are so, to the last page
+};
+
+Mapped mapped(const std::filesystem::path& file) {
+    Mapped found;
     std::ifstream maps("/proc/self/smaps");
-    int found = 0;
     for (std::string line; std::getline(maps, line);) {
-        if (line.find((directory.path() / "frames").string()) == std::string::npos) continue;
+        if (line.find(file.string()) == std::string::npos) continue;
         std::string size;
         std::string resident;
         for (std::string word; maps >> word && word != "Rss:";)
             if (word == "Size:") maps >> size;
         maps >> resident;
-        CHECK(resident == size);
-        ++found;
+        ++found.mappings;
+        if (resident == size) ++found.in_memory;
     }
-    CHECK(found == 2);
+    return found;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: all that it may read is in memory from the beginning") {
+    const Writer writer = frames(64);
+    const Reader reader = open("frames");
+    const Mapped found = mapped(directory.path() / "frames");
+    CHECK(found.mappings == 2);
+    CHECK(found.in_memory == 2);
+}
+
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: what a dead writer left is read, but not fetched into memory") {
+    Writer writer = frames(64);
+    publish_bytes(writer, 10, 7);
+    writer.heartbeat(HostTime{0});
+    Reader reader = open("frames", {Position::oldest});
+    const Mapped found = mapped(directory.path() / "frames");
+    CHECK(found.mappings == 2);
+    CHECK(found.in_memory == 1);  // the writer's
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
+    CHECK(item.stale);
+    CHECK(item.payload.data()[9] == std::byte{7});
+    CHECK(item.valid());
+}
+
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: a ring whose memory was taken back is refused, and takes none") {
+    Writer writer = frames(4);
+    const auto path = directory.path() / "frames";
+    const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
+    const auto size = static_cast<off_t>(4 * page_size);
+    const off_t begin = static_cast<off_t>(std::filesystem::file_size(path)) - size;
+    REQUIRE(::fallocate(file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin, size) == 0);
+    const auto blocks = [&] {
+        struct stat status {};
+        ::fstat(file.get(), &status);
+        return status.st_blocks;
+    };
+    const auto before = blocks();
+    writer.heartbeat(HostTime{0});
+    CHECK(refusal("frames") ==
+          path.string() +
+              ": its service died and its memory was taken back; wait for the service to start");
+    CHECK(blocks() == before);
+    writer.heartbeat(host_now());
+    CHECK(refusal("frames").empty());
 }
 
 TEST_CASE_METHOD(ReaderStreams,

@@ -2,16 +2,12 @@
 #include "client/segment.hpp"
 
 #include <fcntl.h>
-#include <linux/filter.h>
-#include <linux/seccomp.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
 #include <cerrno>
 #include <cstddef>
@@ -21,6 +17,7 @@
 #include <vector>
 
 #include "../support/in_process.hpp"
+#include "../support/shortage.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/process.hpp"
 #include "engine/ring/segment_lifecycle.hpp"
@@ -64,16 +61,7 @@ struct Copies {
 constexpr std::uint64_t segment_size = 4 * page_size;
 
 /// From here on, this process runs on a Linux before 5.14.
-bool forget_to_populate() {
-    std::array<sock_filter, 4> program{
-        {{BPF_LD | BPF_W | BPF_ABS, 0, 0, offsetof(seccomp_data, nr)},
-         {BPF_JMP | BPF_JEQ | BPF_K, 0, 1, SYS_madvise},
-         {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ERRNO | EINVAL},
-         {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}}};
-    const sock_fprog filter{program.size(), program.data()};
-    return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
-           ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
-}
+bool forget_to_populate() { return test::refuse(SYS_madvise, EINVAL); }
 
 /// How many of its pages are touched without waiting.
 std::size_t pages_at_hand(const Mapping& mapping) {
@@ -125,15 +113,16 @@ TEST_CASE_METHOD(Copies, "segment: what its header says is read once") {
 }
 
 TEST_CASE_METHOD(Copies,
-                 "segment: one that is older than life, namespace and attributes has none") {
+                 "segment: one that is older than life, namespaces and attributes has none") {
     const auto path = directory.path() / "changed";
-    for (const std::uint32_t minor : {4U, 5U, 6U, 7U}) {
+    for (const std::uint32_t minor : {4U, 5U, 6U, 7U, 8U}) {
         changed(offsetof(Header, abi_minor), minor);
         const auto mapping = Mapping::open(path, Mapping::Access::read_only);
         REQUIRE(mapping);
         CHECK((mapping->constants().life != 0) == (minor >= 5));
         CHECK((mapping->constants().pid_namespace != 0) == (minor >= 5));
         CHECK(mapping->constants().has_attributes == (minor >= 6));
+        CHECK((mapping->constants().time_namespace != 0) == (minor >= 8));
     }
 }
 
@@ -174,12 +163,29 @@ TEST_CASE("segment: all pages are at hand, also where the kernel must be asked f
     CHECK(pages_at_hand(mapping) < 200);
     CHECK(test::in_process([&] {
         if (!forget_to_populate()) return false;
-        mapping.populate();
-        return pages_at_hand(mapping) == mapping.size() / page_size;
+        return mapping.populate("frames") && pages_at_hand(mapping) == mapping.size() / page_size;
     }));
-    mapping.populate();
+    CHECK(mapping.populate("frames"));
     CHECK(pages_at_hand(mapping) == mapping.size() / page_size);
     ::munmap(static_cast<std::byte*>(gap) + size, page_size);
+}
+
+TEST_CASE_METHOD(Copies, "segment: no page is touched that the kernel cannot have at hand") {
+    const auto mapping = *Mapping::open(directory.path() / "frames", Mapping::Access::read_only);
+    CHECK(test::in_process([&] {
+        const std::size_t before = pages_at_hand(mapping);
+        if (!test::refuse(SYS_madvise, EFAULT)) return false;
+        const auto populated = mapping.populate("frames");
+        return !populated && pages_at_hand(mapping) == before &&
+               populated.error().message() ==
+                   "frames: its memory cannot be mapped: Bad address; free memory: 'df /dev/shm' "
+                   "and 'free' show what there is";
+    }));
+    CHECK(test::in_process([&] {
+        if (!test::refuse(SYS_madvise, EFAULT)) return false;
+        const auto made = Writer::create(directory.path(), {"more", StreamKind::events, 8});
+        return !made && !std::filesystem::exists(directory.path() / ".more.new");
+    }));
 }
 
 TEST_CASE("segment: a file closes with its owner, whatever its number") {

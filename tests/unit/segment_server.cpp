@@ -77,6 +77,23 @@ bool is_handed(const FileDescriptor& socket, const FileDescriptor& file) {
 
 }  // namespace
 
+TEST_CASE("segment_server: a socket is deserted once its server has ended") {
+    const test::TemporaryDirectory directory;
+    const auto path = directory.path() / "stream";
+    CHECK_FALSE(SegmentServer::is_deserted(path));
+    {
+        const auto server = SegmentServer::open(path, sealed_file());
+        REQUIRE(server);
+        CHECK_FALSE(SegmentServer::is_deserted(path));
+    }
+    CHECK(SegmentServer::is_deserted(path));
+    std::filesystem::create_symlink("stream", directory.path() / "link");
+    CHECK_FALSE(SegmentServer::is_deserted(directory.path() / "link"));
+    std::filesystem::remove(path);
+    directory.write("stream", "");
+    CHECK_FALSE(SegmentServer::is_deserted(path));
+}
+
 TEST_CASE("segment_server: a crowd that takes nothing, or leaves at once, stops nobody") {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto path = directory.path() / "server";

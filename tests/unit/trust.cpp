@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/trust.hpp"
 
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <cstdlib>
+#include <fstream>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "../support/in_process.hpp"
@@ -74,7 +78,8 @@ TEST_CASE_METHOD(TrustedInstance, "trust: root's streams are read by everybody w
 TEST_CASE_METHOD(TrustedInstance, "trust: a directory that a stranger made first is not trusted") {
     if (!is_root()) return;
     const std::string cure =
-        "; if the service runs as that user, name it in VERSAVIS_OWNER, or as owner";
+        "; if the service runs as that user, give its name or number in VERSAVIS_OWNER, or as "
+        "owner";
     give_to(stranger);
     CHECK(refusal() ==
           "events: belongs to user 12345, who is neither root, nor you, nor 'versavis'" + cure);
@@ -96,6 +101,55 @@ TEST_CASE_METHOD(TrustedInstance, "trust: the environment names an owner") {
         ::setenv("VERSAVIS_OWNER", "", 1);
         return root_owns && nobody_owns && refusal().empty();
     }));
+}
+
+TEST_CASE("trust: an owner in the environment may be a number") {
+    CHECK(test::in_process([] {
+        const auto owned = [](const char* name, std::uint32_t user) {
+            ::setenv("VERSAVIS_OWNER", name, 1);
+            return may_own(user, std::nullopt);
+        };
+        // 4294967296 and 8589939303 are 0 and 4711 in 32 bits.
+        return owned("4711", 4711) && !owned("4711", 4712) && !owned("4711", ::geteuid()) &&
+               owned("0", 0) && owned("04711", 4711) && owned("4294967295", UINT32_MAX) &&
+               !owned("4294967296", 0) && !owned("4294967296", UINT32_MAX) &&
+               !owned("8589939303", 4711) && !owned("4711x", 4711) && !owned("-4711", 4711) &&
+               !owned("+4711", 4711) && !owned(" 4711", 4711) && !owned("0x10", 16);
+    }));
+}
+
+namespace {
+
+/// From here on, this process sees no user but itself: others are 65534 to it.
+bool enter_namespace_of_one_user() {
+    const auto user = ::geteuid();
+    return ::unshare(CLONE_NEWUSER) == 0 &&
+           static_cast<bool>(std::ofstream("/proc/self/uid_map")
+                             << user << ' ' << user << " 1" << std::flush);
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(TrustedInstance, "trust: an owner whom a container does not map is named so") {
+    if (!is_root() || !test::in_process(enter_namespace_of_one_user)) {
+        WARN("not tested: this machine lets nobody make a user namespace");
+        return;
+    }
+    give_to(stranger);
+    REQUIRE(::chmod(directory.path().c_str(), 0755) == 0);
+    REQUIRE(::chmod(path().c_str(), 0644) == 0);
+    CHECK(test::in_process([&] {
+        return enter_namespace_of_one_user() &&
+               refusal() ==
+                   "events: belongs to a user that this container does not map; map the service's "
+                   "user in it; or, if all users outside are trusted, set VERSAVIS_OWNER=65534";
+    }));
+    CHECK(test::in_process([&] {
+        ::setenv("VERSAVIS_OWNER", "65534", 1);
+        return enter_namespace_of_one_user() && refusal().empty();
+    }));
+    give_to(65534);  // a user of that number, where all are mapped
+    CHECK_THAT(refusal(), Catch::Contains("belongs to user 65534, who is neither root"));
 }
 
 TEST_CASE_METHOD(TrustedInstance, "trust: a file that somebody else may have made is refused") {

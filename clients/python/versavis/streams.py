@@ -184,15 +184,22 @@ def position_number(position):
     return library.POSITIONS[position]
 
 
+LAST_USER = 2**32 - 1
+
+
 def owner_number(owner):
     if owner is None:
         return library.ANY_OWNER
-    if isinstance(owner, str):
+    if isinstance(owner, str) and not (owner.isascii() and owner.isdigit()):
         try:
             return pwd.getpwnam(owner).pw_uid
         except KeyError:
             raise Error(f"there is no user '{owner}' who could own the streams") from None
-    return int(owner)
+    number = int(owner)
+    if not 0 <= number <= LAST_USER:
+        raise Error(f"there is no user {number} who could own the streams: numbers of users go "
+                    f"from 0 to {LAST_USER}")
+    return number
 
 
 def encoded(text):
@@ -210,8 +217,8 @@ def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_
     instance: of the service; None: that of $VERSAVIS_INSTANCE, or "default".
     start, after_loss: "next", "latest", "middle" or "oldest": where to begin, and where to go on
     when items were lost (None: "middle").
-    owner: user, by name or number, to whom the streams must belong; None: root, oneself, or
-    "versavis", or whom $VERSAVIS_OWNER names.
+    owner: user, by name or number, to whom the streams must belong; None: whom $VERSAVIS_OWNER
+    names, by name or number; without it root, oneself, or "versavis".
     sealed_only: only of a service that seals its streams: nobody can cut them short.
 
     Raises Error with what to do."""

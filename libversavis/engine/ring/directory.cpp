@@ -16,6 +16,7 @@
 #include "client/process.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
+#include "engine/ring/foreign_segments.hpp"
 #include "engine/ring/segment_lifecycle.hpp"
 
 namespace versavis::ring {
@@ -26,12 +27,23 @@ namespace {
 // file.
 constexpr auto lock_name = ".lock";
 
+std::string errno_text() { return std::generic_category().message(errno); }
+
+/// The directory itself: no link to another one is followed.
+Expected<FileDescriptor> open_directory(const std::filesystem::path& path) {
+    FileDescriptor directory(::open(path.c_str(), O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (directory) return directory;
+    if (errno == ENOTDIR || errno == ELOOP)
+        return failure(path.string(), "is not a directory", "remove it");
+    return failure(path.string(), fmt::format("cannot be opened: {}", errno_text()),
+                   "run the service as the user that owns it");
+}
+
 /// Nobody else can put a ring there or take one away, from there or with the whole directory.
-Expected<> check_trust(const std::filesystem::path& path) {
+Expected<> check_trust(const FileDescriptor& opened, const std::filesystem::path& path) {
     struct stat directory {};
     struct stat parent {};
-    if (::lstat(path.c_str(), &directory) != 0 || !S_ISDIR(directory.st_mode))
-        return failure(path.string(), "is not a directory", "remove it");
+    ::fstat(opened.get(), &directory);
     if (directory.st_uid != ::geteuid())
         return failure(path.string(),
                        fmt::format("belongs to another user (uid {})", directory.st_uid),
@@ -54,26 +66,40 @@ Expected<> check_trust(const std::filesystem::path& path) {
     return {};
 }
 
-/// None: it is no segment, or a sealed one whose process has ended.
-std::optional<Constants> constants_of(const std::filesystem::path& path) {
+/// Errors: it is no segment, or a sealed one whose process has ended.
+Expected<Mapping> open_segment(const std::filesystem::path& path) {
     const auto file = open_trusted(path, ::geteuid());
-    if (!file) return std::nullopt;
-    const auto segment = Mapping::open(*file, path, Mapping::Access::read_only);
-    if (!segment) return std::nullopt;
-    return segment->constants();
+    if (!file) return Unexpected(file.error());
+    return Mapping::open(*file, path, Mapping::Access::read_only);
 }
 
 /// Another process that writes a ring there; 0: none. It is found even when somebody has removed
 /// the file that it locked.
 std::uint32_t living_writer(const std::filesystem::path& directory) {
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
-        const auto constants = constants_of(entry.path());
-        if (!constants || is_own(*constants)) continue;
-        const std::uint64_t start = start_ticks_of(constants->writer_pid);
-        if (start != 0 && start == constants->writer_start_ticks) return constants->writer_pid;
-    }
+    for (const ForeignSegment& segment : foreign_segments(directory, open_segment))
+        if (segment.alive) return segment.mapping.constants().writer_pid;
     return 0;
+}
+
+/// The file that is locked. It is made if needed; whatever else has its name is refused, so that
+/// neither a link nor another user's file is written to.
+Expected<FileDescriptor> open_lock(const FileDescriptor& directory,
+                                   const std::filesystem::path& path) {
+    const auto file = (path / lock_name).string();
+    FileDescriptor lock(::openat(directory.get(), lock_name,
+                                 O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600));
+    struct stat found {};
+    if (!lock && errno == ELOOP)
+        return failure(file, "is a link, not the lock of a service", "remove it");
+    if (!lock || ::fstat(lock.get(), &found) != 0)
+        return failure(file, fmt::format("cannot be opened: {}", errno_text()),
+                       "remove it, or run the service as the user that owns it");
+    if (!S_ISREG(found.st_mode))
+        return failure(file, "is not a file, as the lock of a service is", "remove it");
+    if (found.st_uid != ::geteuid())
+        return failure(file, fmt::format("belongs to another user (uid {})", found.st_uid),
+                       "remove it, or run the service as that user");
+    return lock;
 }
 
 Unexpected<Error> served(const std::filesystem::path& path, std::uint32_t process) {
@@ -95,14 +121,13 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     if (error)
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
-    if (auto trusted = check_trust(path); !trusted) return Unexpected(trusted.error());
-    FileDescriptor lock(::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600));
-    if (!lock)
-        return failure(path.string(),
-                       fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
-                       "run the service as the user that owns it");
-    if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return served(path, living_writer(path));
-    OwnedDirectory owned(path, std::move(lock));
+    const auto directory = open_directory(path);
+    if (!directory) return Unexpected(directory.error());
+    if (auto trusted = check_trust(*directory, path); !trusted) return Unexpected(trusted.error());
+    auto lock = open_lock(*directory, path);
+    if (!lock) return Unexpected(lock.error());
+    if (::flock(lock->get(), LOCK_EX | LOCK_NB) != 0) return served(path, living_writer(path));
+    OwnedDirectory owned(path, std::move(*lock));
     if (const std::uint32_t process = living_writer(path); process != 0)
         return served(path, process);
     return owned;
@@ -113,8 +138,8 @@ void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {
     for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
         const std::string name = entry.path().filename();
         if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
-        const auto constants = constants_of(entry.path());
-        if (constants && is_own(*constants)) continue;
+        const auto found = open_segment(entry.path());
+        if (found && is_own(found->constants())) continue;
         auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
         std::filesystem::remove(entry.path(), error);
         if (segment) end(segment->header());

@@ -33,6 +33,16 @@ Unexpected<> not_made(const std::filesystem::path& path) {
         "does its directory belong to the service's user?");
 }
 
+/// The address of a file that is open, or of one in a directory that is: it holds 107 characters,
+/// and a path may be longer.
+sockaddr_un address_of(const FileDescriptor& file, const std::string& name = {}) {
+    const std::string path = fmt::format("/proc/self/fd/{}{}", file.get(), name);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof address.sun_path);  // zero-terminated or full
+    return address;
+}
+
 /// Never waits. A client that does not take it, or has left, gets nothing.
 void hand_over(int segment, int connection) {
     char byte{};
@@ -58,12 +68,7 @@ Expected<std::unique_ptr<SegmentServer>> SegmentServer::open(const std::filesyst
     const FileDescriptor directory(::open(path.parent_path().c_str(), O_PATH | O_CLOEXEC));
     FileDescriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     if (!directory || !socket) return not_made(path);
-    // An address holds 107 characters, and a path may be longer.
-    const std::string name =
-        fmt::format("/proc/self/fd/{}/{}", directory.get(), path.filename().string());
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    name.copy(address.sun_path, sizeof address.sun_path);  // zero-terminated or full
+    const sockaddr_un address = address_of(directory, "/" + path.filename().string());
     ::unlink(path.c_str());
     if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
         ::chmod(path.c_str(), 0660) != 0 ||  // whatever umask says
@@ -77,6 +82,19 @@ Expected<std::unique_ptr<SegmentServer>> SegmentServer::open(const std::filesyst
                        "raise the limit on tasks");
     }
     return server;
+}
+
+bool SegmentServer::is_deserted(const std::filesystem::path& path) {
+    const FileDescriptor file(::open(path.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
+    const FileDescriptor client(
+        ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    struct stat found {};
+    if (!file || !client || ::fstat(file.get(), &found) != 0 || !S_ISSOCK(found.st_mode))
+        return false;
+    const sockaddr_un address = address_of(file);
+    return ::connect(client.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+               0 &&
+           errno == ECONNREFUSED;
 }
 
 SegmentServer::SegmentServer(FileDescriptor segment, FileDescriptor socket)

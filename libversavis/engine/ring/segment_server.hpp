@@ -19,6 +19,10 @@ class SegmentServer {
     /// Errors: the socket cannot be created there, or no thread can be started.
     static Expected<std::unique_ptr<SegmentServer>> open(const std::filesystem::path& path,
                                                          FileDescriptor segment);
+
+    /// True: `path` is the socket of a server whose process has ended.
+    static bool is_deserted(const std::filesystem::path& path);
+
     SegmentServer(const SegmentServer&) = delete;
     SegmentServer& operator=(const SegmentServer&) = delete;
     ~SegmentServer();

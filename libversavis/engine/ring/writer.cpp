@@ -5,23 +5,29 @@
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <functional>
 #include <random>
 #include <system_error>
+#include <thread>
 
+#include "client/deadline.hpp"
 #include "client/process.hpp"
 #include "client/segment.hpp"
+#include "engine/ring/foreign_segments.hpp"
 #include "engine/ring/memory_budget.hpp"
 #include "engine/ring/segment_lifecycle.hpp"
 #include "engine/ring/segment_server.hpp"
 #include "engine/ring/waiter_waker.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace versavis::ring {
 
@@ -115,28 +121,69 @@ Expected<std::unique_ptr<SegmentServer>> seal(FileDescriptor file,
     return SegmentServer::open(path, std::move(file));
 }
 
-/// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
-/// its slot taken back, then the successor.
-void release(const std::filesystem::path& path, const Mapping& dead) {
-    const Constants& constants = dead.constants();
-    for (std::uint32_t slot = 0; slot < constants.slot_count; ++slot)
-        dead.generation(slot).fetch_add(2, std::memory_order_relaxed);
-    // SYNC 4: release fence here, acquire fence in Payload::valid(), as in Writer::acquire().
-    std::atomic_thread_fence(std::memory_order_release);
-    const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
-    const auto begin = static_cast<off_t>(constants.slots_at);
-    ::fallocate(file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
-                static_cast<off_t>(constants.total_size) - begin);
+/// For readers of a dead writer's ring to let go of it: they do at their next look, after 20 ms if
+/// they sleep. If lower, one that works on an item has not yet; if higher, a service that is short
+/// of memory starts later, or says so later.
+constexpr Duration time_to_let_go = milliseconds(500);
+
+constexpr auto between_tries = std::chrono::milliseconds(10);
+
+/// Rings that were there.
+struct Removed {
+    bool any = false;
+    std::uint64_t size = 0;  ///< of those that were files, in bytes
+};
+
+/// Takes the names of the rings that dead writers left in `directory`, so that their memory is free
+/// when no reader has them mapped any more.
+Removed remove_dead(const std::filesystem::path& directory) {
+    Removed removed;
+    const auto open = [&](const std::filesystem::path& path) {
+        // A new one has a name that begins with a dot, and is not served yet.
+        const bool deserted =
+            is_stream_name(path.filename().string()) && SegmentServer::is_deserted(path);
+        if (deserted && ::unlink(path.c_str()) == 0) removed.any = true;
+        return Mapping::open(path, Mapping::Access::read_write);
+    };
+    for (const ForeignSegment& segment : foreign_segments(directory, open)) {
+        if (segment.alive) continue;
+        struct stat file {};
+        if (::stat(segment.path.c_str(), &file) == 0)
+            removed.size += static_cast<std::uint64_t>(file.st_blocks) * 512;
+        removed.any = true;
+        supersede(segment.mapping.header());
+        ::unlink(segment.path.c_str());
+        wake_readers(segment.mapping.header());
+    }
+    return removed;
 }
 
-/// What dead writers left in the directory takes memory that is needed now.
-void release_dead(const std::filesystem::path& directory) {
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
-        const auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
-        if (!segment || is_own(segment->constants())) continue;
-        if (liveness(segment->constants()) != Liveness::alive) release(entry.path(), *segment);
-    }
+/// Free in the directory's file system, in bytes.
+std::uint64_t free_space(const std::filesystem::path& directory) {
+    struct statvfs system {};
+    ::statvfs(directory.c_str(), &system);
+    return std::uint64_t{system.f_bfree} * system.f_frsize;
+}
+
+/// `make` has failed for lack of memory, with `why`. Tries again when dead writers' rings are
+/// removed, until readers had the time to let go of them.
+Expected<FileDescriptor> make_in_place_of_dead(
+    const std::filesystem::path& directory, Error why,
+    const std::function<Expected<FileDescriptor>()>& make) {
+    const std::uint64_t before = free_space(directory);
+    const Removed dead = remove_dead(directory);
+    if (!dead.any) return Unexpected(std::move(why));
+    auto made = make();
+    for (const HostTime end = deadline_after(time_to_let_go); !made && !is_over(end); made = make())
+        std::this_thread::sleep_for(between_tries);
+    const std::uint64_t now = free_space(directory);
+    const std::uint64_t freed = now - std::min(before, now);
+    if (made || freed >= dead.size) return made;
+    Error& error = made.error();
+    error.what += fmt::format(", while programs still hold {} MiB of a service that died",
+                              (dead.size - freed + (1 << 20U) - 1) >> 20U);
+    error.cure += ", or end those that read its streams";
+    return made;
 }
 
 /// Of the process that fills the header: no other one of this machine, ever, has the same.
@@ -165,7 +212,8 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.slots_at =
         round_up(header.generations_at + shape.slot_count * generation_stride, page_size);
     shape.name.copy(header.name, sizeof header.name);
-    header.pid_namespace = own_pid_namespace();
+    header.pid_namespace = own_namespaces().pid;
+    header.time_namespace = own_namespaces().time;
     header.life = shape.life != 0 ? shape.life : life_of(header);
     header.head.store(shape.first_item, std::memory_order_relaxed);
     header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
@@ -201,24 +249,23 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     const auto path = place.directory / shape.name;
     const auto temporary = place.directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
-    auto old = Mapping::open(path, Mapping::Access::read_write);
     const auto make = [&]() -> Expected<FileDescriptor> {
         auto fits = place.sealed ? check_memory(path, size) : check_tmpfs_space(path, size);
         if (!fits) return Unexpected(fits.error());
         return place.sealed ? make_nameless(path, size) : make_file(temporary, size);
     };
     auto file = make();
-    if (!file) {
-        release_dead(place.directory);
-        file = make();
-    }
+    if (!file) file = make_in_place_of_dead(place.directory, file.error(), make);
     if (!file) return Unexpected(file.error());
     auto mapping = Mapping::open_unchecked(file->get(), temporary, Mapping::Access::read_write);
     if (!mapping) {
         ::unlink(temporary.c_str());
         return Unexpected(mapping.error());
     }
-    mapping->populate();
+    if (auto populated = mapping->populate(path); !populated) {
+        ::unlink(temporary.c_str());
+        return Unexpected(populated.error());
+    }
     fill_header(mapping->header(), shape, size);
     mapping->read_constants();
     number_descriptors(*mapping, shape.first_item);
@@ -233,6 +280,7 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     }
     // Superseded before the name changes: when this process dies in between, readers know at once
     // that nothing more comes from the old one. They are woken when there is something to find.
+    auto old = Mapping::open(path, Mapping::Access::read_write);
     if (old) supersede(old->header());
     if (::rename(temporary.c_str(), path.c_str()) != 0) {
         const int error = errno;

@@ -39,9 +39,10 @@ struct Place {
 class Writer {
  public:
     /// Makes the segment `place.directory / shape.name`, its memory allocated and populated. A
-    /// segment that an earlier writer left there is marked superseded and its readers are woken;
-    /// where memory is short, what a dead writer left is freed first. Errors: the file cannot be
-    /// created, or its memory not reserved.
+    /// segment that an earlier writer left there is marked superseded and its readers are woken.
+    /// Where memory is short, the rings of dead writers in the directory lose their names, and
+    /// their readers have half a second to let go of them. Errors: the file cannot be created, or
+    /// its memory not reserved.
     static Expected<Writer> create(const Place& place, const Shape& shape);
 
     Writer(Writer&&) noexcept;

@@ -29,7 +29,7 @@ namespace versavis::ring {
 
 inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
 inline constexpr std::uint32_t abi_major = 1;
-inline constexpr std::uint32_t abi_minor = 7;
+inline constexpr std::uint32_t abi_minor = 8;
 inline constexpr std::size_t page_size = 4096;
 inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's words
 inline constexpr std::size_t metadata_words = 12;
@@ -66,9 +66,10 @@ struct Header {
     std::uint64_t descriptors_at;
     std::uint64_t generations_at;
     std::uint64_t slots_at;
-    char name[64];                ///< zero-terminated
-    std::uint64_t life;           ///< equal in all segments that one run of a service made
-    std::uint64_t pid_namespace;  ///< inode of the writer's /proc/self/ns/pid; 0: unknown
+    char name[64];                 ///< zero-terminated
+    std::uint64_t life;            ///< equal in all segments that one run of a service made
+    std::uint64_t pid_namespace;   ///< inode of the writer's /proc/self/ns/pid; 0: unknown
+    std::uint64_t time_namespace;  ///< of its /proc/self/ns/time; 0: unknown, or there are none
 
     alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation (SYNC 1)
     alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped by each publication and
@@ -104,6 +105,7 @@ static_assert(offsetof(Header, writer_start_ticks) == 56 &&
 static_assert(offsetof(Header, slot_size) == 72 && offsetof(Header, descriptors_at) == 80);
 static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104);
 static_assert(offsetof(Header, life) == 168 && offsetof(Header, pid_namespace) == 176);
+static_assert(offsetof(Header, time_namespace) == 184);
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
 static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
 static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128);

@@ -65,8 +65,8 @@ enum class Position {
 struct Options {
     Position start = Position::next;
     Position after_loss = Position::middle;  ///< where to go on when items were lost
-    /// User id that the stream must belong to. None: root, this process's user, that of the name in
-    /// $VERSAVIS_OWNER, or `versavis`.
+    /// User id that the stream must belong to. None: that of the name or number in $VERSAVIS_OWNER;
+    /// without it root, this process's user, or `versavis`.
     std::optional<std::uint32_t> owner{};
     /// Only streams of a service with `sealed = true`: no one, not even their owner, can cut them
     /// short, which ends a program that reads with SIGBUS.
@@ -133,11 +133,14 @@ class VERSAVIS_API Reader {
     Received look();
     Received lapped();
     Received hand_over();
+    Received gone();
+    bool not_there() const;
+    void let_go();
     Received settle();
     bool writer_seen();
     bool ready();
     std::optional<HostTime> retry() const;
-    FutexWord wake_word() const;
+    FutexWord wake_word();
     WatchTarget target(std::uint32_t seen) const;
 
     std::filesystem::path path_;
