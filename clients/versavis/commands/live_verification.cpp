@@ -95,7 +95,7 @@ class LiveCamera {
         GreyImage image = reduced_image(*view, factor);
         if (!frame.valid()) return {};  // overtaken by the writer while it was read
         if (!tracker_)
-            if (const auto begun = begin(*view, factor); !begun) return begun;
+            if (auto begun = begin(*view, factor); !begun) return begun;
         followed_ = frame.time;
         auto rotation = tracker_->add(std::move(image), frame.time);
         if (!rotation) {  // the size changed
@@ -230,7 +230,7 @@ class LiveVerification {
             for (; frame || frame.error().why != Pause::nothing; frame = camera->stream().next()) {
                 if (!frame && frame.error().why == Pause::gone) break;
                 if (!frame) continue;
-                if (const auto added = camera->add(*frame, gyro_span_); !added) return added;
+                if (auto added = camera->add(*frame, gyro_span_); !added) return added;
             }
             while (const auto stretch = camera->take()) report(*camera, *stretch);
         }

@@ -13,8 +13,7 @@ FeatureRotation::FeatureRotation(FeatureRotation&&) noexcept = default;
 FeatureRotation& FeatureRotation::operator=(FeatureRotation&&) noexcept = default;
 FeatureRotation::~FeatureRotation() = default;
 
-Expected<FeatureRotation> FeatureRotation::create(const CameraModel& /*camera*/,
-                                                  int /*features*/) {
+Expected<FeatureRotation> FeatureRotation::create(const CameraModel& /*camera*/, int /*features*/) {
     return failure("features", "this program was built without OpenCV",
                    "install Debian's libopencv-video-dev and build it again");
 }

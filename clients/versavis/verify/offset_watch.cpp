@@ -55,18 +55,18 @@ Duration weighted_median(std::vector<PictureOffset> offsets) {
     return offsets.back().offset;
 }
 
-/// By how much the offsets differ from the usual one: their weighted mean.
-Departure mean_departure(std::deque<PictureOffset>::const_iterator begin,
-                         std::deque<PictureOffset>::const_iterator end,
+/// By how much the last offsets differ from the usual one: their weighted mean.
+Departure mean_departure(const std::deque<PictureOffset>& offsets, std::size_t count,
                          const PictureOffset& usual) {
     double weights = 0;
     double sum = 0;
-    for (auto one = begin; one != end; ++one) {
-        weights += weight(*one);
-        sum += weight(*one) * ns(one->offset - usual.offset);
+    const std::size_t first = offsets.size() - count;
+    for (std::size_t i = first; i < offsets.size(); ++i) {
+        weights += weight(offsets[i]);
+        sum += weight(offsets[i]) * ns(offsets[i].offset - usual.offset);
     }
     const double sigma = std::sqrt(1 / weights + ns(usual.sigma) * ns(usual.sigma));
-    return {{std::llround(sum / weights)}, {std::llround(sigma)}, begin->from};
+    return {{std::llround(sum / weights)}, {std::llround(sigma)}, offsets[first].from};
 }
 
 }  // namespace
@@ -130,7 +130,7 @@ std::optional<Departure> OffsetWatch::departing() const {
     const double scatter = this->scatter();
     for (std::size_t count = least_departing; count <= latest_.size(); ++count) {
         const auto begin = latest_.end() - static_cast<std::ptrdiff_t>(count);
-        Departure found = mean_departure(begin, latest_.end(), *usual_);
+        Departure found = mean_departure(latest_, count, *usual_);
         found.sigma = {std::llround(scatter * ns(found.sigma))};
         const double sign = found.by.ns < 0 ? -1 : 1;
         const bool all = std::all_of(begin, latest_.end(), [&](const PictureOffset& one) {
