@@ -4,7 +4,17 @@
 #include <versavis/stream.hpp>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
+#include <string>
+
+namespace {
+
+std::string sigma_text(std::uint32_t sigma_ns) {
+    return sigma_ns == versavis::sigma_unknown ? "unknown" : std::to_string(sigma_ns) + " ns";
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
     auto stream = versavis::FrameStream::open(argc > 1 ? argv[1] : "cam0");
@@ -18,6 +28,7 @@ int main(int argc, char** argv) {
             std::fprintf(stderr, "%s\n", frame.error().message().c_str());
             continue;
         }
+        if ((frame->data.flags & versavis::flag_suspect) != 0) continue;  // its time is a guess
         const auto image = frame->image();
         if (!image || image->layout.bytes_per_channel != 1) continue;  // not 8 bits
         const std::size_t width = std::size_t{image->width} * image->layout.channels;
@@ -26,8 +37,9 @@ int main(int argc, char** argv) {
             for (std::size_t x = 0; x < width; ++x)
                 sum += static_cast<double>(image->data[y * image->stride + x]);
         if (!frame->valid()) continue;  // the writer needed the slot: forget what was read
-        std::printf("%lld ns +- %u ns: mean brightness %.1f\n",
-                    static_cast<long long>(frame->time.ns), frame->data.sigma_ns,
+        std::printf("%lld ns +- %s: mean brightness %.1f\n", static_cast<long long>(frame->time.ns),
+                    sigma_text(frame->data.sigma_ns).c_str(),
                     sum / static_cast<double>(width * image->height));
+        if (std::fflush(stdout) != 0) return 1;  // nobody reads on, or the disk is full
     }
 }

@@ -5,10 +5,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "../support/process.hpp"
 #include "../support/stack.hpp"
+#include "../support/temporary_directory.hpp"
 
 using namespace versavis;
 using test::Process;
@@ -39,7 +41,46 @@ const std::vector<Example> examples{
     {python("numpy_consumer.py"), "changed by", "the service is gone"},
 };
 
+bool is_python(const Example& example) { return example.command.front() == "/usr/bin/python3"; }
+
+/// What a program needs to find its streams, the library and the package.
+class Environment {
+ public:
+    explicit Environment(const std::string& instance) {
+        ::setenv("VERSAVIS_INSTANCE", instance.c_str(), 1);
+        ::setenv("VERSAVIS_LIBRARY", VERSAVIS_LIBRARY_FILE, 1);
+        ::setenv("PYTHONPATH", VERSAVIS_SOURCE_DIR "/clients/python", 1);
+        ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
+    }
+    ~Environment() {
+        for (const char* name : {"VERSAVIS_INSTANCE", "VERSAVIS_LIBRARY", "PYTHONPATH"})
+            ::unsetenv(name);
+    }
+    Environment(const Environment&) = delete;
+    Environment& operator=(const Environment&) = delete;
+};
+
+/// The exit code of a shell in which `script` runs this program as "$@".
+int in_shell(const char* script, const std::vector<std::string>& command, const std::string& log,
+             std::string* output = nullptr) {
+    std::vector<std::string> all{"/bin/sh", "-c", script, "sh"};
+    all.insert(all.end(), command.begin(), command.end());
+    return test::run(all, log, output);
+}
+
 }  // namespace
+
+TEST_CASE("examples: without a service each says so in a sentence") {
+    const Environment environment("nobody");
+    const test::TemporaryDirectory directory;
+    for (const Example& example : examples) {
+        CAPTURE(example.command);
+        std::string output;
+        CHECK(test::run(example.command, (directory.path() / "log").string(), &output) == 1);
+        CHECK_THAT(output,
+                   Catch::Contains("is the service running?") && !Catch::Contains("Traceback"));
+    }
+}
 
 TEST_CASE("examples: each does what it says, and goes on after a restart") {
     test::StackSettings settings{"examples", 61, 2, 20, "", "", ""};
@@ -48,10 +89,7 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status([](const auto& status) { return status["health"] == "ok"; });
-    ::setenv("VERSAVIS_INSTANCE", stack.instance().c_str(), 1);
-    ::setenv("VERSAVIS_LIBRARY", VERSAVIS_LIBRARY_FILE, 1);
-    ::setenv("PYTHONPATH", VERSAVIS_SOURCE_DIR "/clients/python", 1);
-    ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
+    const Environment environment(stack.instance());
     const std::filesystem::path door = stream_path(stack.instance(), "cam0");
     CHECK(std::filesystem::is_socket(door));
     // A reader written from the document finds the way in, too.
@@ -64,6 +102,17 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
     for (std::size_t i = 0; i < examples.size(); ++i) {
         CAPTURE(examples[i].command);
         CHECK(running[i]->wait_for_output(examples[i].line, seconds(20)));
+    }
+    for (const char* viewer : {"example-viewer", "example-viewer-c"})
+        CHECK(in_shell("exec \"$@\" > /dev/full", {test::program(viewer)},
+                       stack.log_path("full")) == 1);
+    for (const Example& example : examples) {
+        if (!is_python(example)) continue;
+        CAPTURE(example.command);
+        std::string output;
+        CHECK(in_shell("\"$@\" | head -n 1", example.command, stack.log_path("head"), &output) ==
+              0);
+        CHECK_THAT(output, !Catch::Contains("Traceback") && !Catch::Contains("BrokenPipe"));
     }
     stack.kill_service();
     for (std::size_t i = 0; i < examples.size(); ++i) {
@@ -82,8 +131,8 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
         while (!goes_on() && host_now() < deadline)
             stack.wait_for_status([](auto&) { return true; });
         CHECK(goes_on());
-        running[i]->signal(SIGKILL);
+        running[i]->signal(SIGINT);
+        CHECK(running[i]->wait(seconds(20)) == (is_python(examples[i]) ? 0 : 128 + SIGINT));
+        CHECK_THAT(running[i]->output(), !Catch::Contains("Traceback"));
     }
-    for (const char* name : {"VERSAVIS_INSTANCE", "VERSAVIS_LIBRARY", "PYTHONPATH"})
-        ::unsetenv(name);
 }

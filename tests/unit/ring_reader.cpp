@@ -472,6 +472,53 @@ TEST_CASE_METHOD(ReaderStreams,
 }
 
 TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: of a ring without a name nothing is kept but what is held") {
+    Writer writer = frames(4);
+    const auto path = directory.path() / "frames";
+    Reader reader = open("frames");
+    for (std::uint8_t fill = 1; fill <= 2; ++fill) publish_bytes(writer, 10, fill);
+    auto held = test::look(reader.next());
+    writer.heartbeat(HostTime{0});
+    std::filesystem::remove(path);
+    CHECK(test::look(reader.next()).payload.data()[0] == std::byte{2});
+    CHECK(mapped(path).mappings == 2);
+    CHECK(test::look(reader.next(seconds(20))).found == test::Found::gone);
+    CHECK(mapped(path).mappings == 2);
+    CHECK(held.payload.data()[0] == std::byte{1});
+    CHECK(held.valid());
+    held = {};
+    CHECK(mapped(path).mappings == 1);  // the writer's
+    CHECK(reader.name() == std::string("frames"));
+    CHECK(reader.kind() == StreamKind::frames);
+    CHECK(reader.head() == 2);
+    CHECK(reader.writer_pid() == static_cast<std::uint32_t>(::getpid()));
+    CHECK_FALSE(reader.writer_alive());
+    for (const Position position : {Position::oldest, Position::middle, Position::latest}) {
+        reader.seek(position);
+        CHECK(test::look(reader.next()).found == test::Found::gone);
+        CHECK(test::look(reader.latest(milliseconds(1))).found == test::Found::gone);
+    }
+    Writer second = frames(4);
+    publish_bytes(second, 10, 3);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
+    CHECK(test::look(reader.next()).payload.data()[0] == std::byte{3});
+}
+
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: what came late is read before a ring without a name is left") {
+    Writer writer = events();
+    Reader reader = open("events");
+    writer.heartbeat(HostTime{0});
+    CHECK(test::look(reader.next(seconds(20))).found == test::Found::gone);
+    writer.publish(OutputTime{}, {7});
+    std::filesystem::remove(directory.path() / "events");
+    const auto late = test::look(reader.next(milliseconds(1)));
+    CHECK(late.found == test::Found::item);
+    CHECK(late.metadata[0] == 7);
+    CHECK(test::look(reader.next(seconds(20))).found == test::Found::gone);
+}
+
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: a ring whose memory was taken back is refused, and takes none") {
     Writer writer = frames(4);
     const auto path = directory.path() / "frames";
