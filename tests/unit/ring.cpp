@@ -398,6 +398,7 @@ bool made_anew_in_tight_memory(const std::function<void(Reader&, const std::atom
     if (!reader || test::look(reader->next()).found != test::Found::gone) return false;
     std::atomic<bool> made{false};
     std::thread waiting([&] { wait(*reader, made); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until it has looked, and sleeps
     auto writer = Writer::create(memory, large);
     made = true;
     waiting.join();
@@ -443,6 +444,15 @@ bool made_beside_the_dead() {
     return left && own && served && other && Reader::open(memory / "own")->writer_alive() &&
            Reader::open(memory / "served") && !std::filesystem::exists(memory / "sealed") &&
            !std::filesystem::exists(memory / "frames");
+}
+
+/// What nobody holds is not called so.
+bool names_no_holders() {
+    const std::filesystem::path memory = "/dev/shm";
+    if (!make_memory_tight() || !leave_dead(memory)) return false;
+    const auto refused = Writer::create(memory, {"huge", StreamKind::frames, 8, 64, 512 << 10});
+    return !refused && !std::filesystem::exists(memory / "frames") &&
+           refused.error().message().find("still hold") == std::string::npos;
 }
 
 /// A writer in another container, of which nothing shows that it lives but its heart.
@@ -494,6 +504,7 @@ TEST_CASE("ring: a dead writer's memory is used again where there is no other") 
     }
     CHECK(in_process(held_stays_whole));
     CHECK(in_process(made_beside_the_dead));
+    CHECK(in_process(names_no_holders));
     CHECK(in_process(spares_whose_heart_beats));
     for (const auto wait : {wait_in_next, wait_alone, wait_in_set, wait_by_poll})
         CHECK(in_process([&] { return made_anew_in_tight_memory(wait); }));
