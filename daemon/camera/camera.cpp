@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <thread>
 
 #include "base/thread_watch.hpp"
 #include "camera/aravis_stream.hpp"
@@ -82,6 +83,9 @@ using Flag = std::shared_ptr<std::atomic<bool>>;
 /// More than any camera takes.
 constexpr double longest_exposure_us = 1e9;
 
+/// A report of lost control takes microseconds, but a busy machine may interrupt it.
+constexpr Duration longest_report = seconds(10);
+
 using Features = std::vector<std::pair<std::string, std::string>>;
 
 /// Those of `after` that are new or have another value; none: one of `before` is gone.
@@ -99,6 +103,18 @@ std::optional<Features> differing_features(const Features& before, const Feature
 
 void on_control_lost(ArvDevice* /*device*/, Flag* lost) { **lost = true; }
 void forget(gpointer flag, GClosure* /*closure*/) { delete static_cast<Flag*>(flag); }
+
+/// While the device's heartbeat thread reports a loss of control, it holds a reference. That must
+/// not be the last one: the end of the device waits for this thread.
+void release(ArvCamera* camera) {
+    ArvDevice* device = arv_camera_get_device(camera);
+    g_object_ref(device);
+    g_object_unref(camera);
+    const HostTime end = host_now() + longest_report;
+    while (g_atomic_int_get(&G_OBJECT(device)->ref_count) > 1 && host_now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    g_object_unref(device);
+}
 
 }  // namespace
 
@@ -376,7 +392,7 @@ CameraResult<> Camera::session() {
     g_signal_connect_data(arv_camera_get_device(camera), "control-lost",
                           G_CALLBACK(on_control_lost), new Flag(lost), forget, GConnectFlags{});
     auto ended = pause({}) ? set_up_and_stream(camera, *lost) : CameraResult<>{};
-    environment_.patient.run([camera] { g_object_unref(camera); }, release_timeout);
+    environment_.patient.run([camera] { release(camera); }, release_timeout);
     return ended;
 }
 

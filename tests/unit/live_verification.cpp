@@ -137,7 +137,8 @@ class MovingInstance {
 
 }  // namespace
 
-TEST_CASE("live_verification: a camera whose stamps step by 1 ms is named, and its return") {
+TEST_CASE("live_verification: a camera whose stamps step by 1 ms is named, and its return",
+          "[statistics]") {
     MovingInstance instance;
     instance.open();
     auto settings = instance.settings();
@@ -163,7 +164,8 @@ TEST_CASE("live_verification: a camera whose stamps step by 1 ms is named, and i
     CHECK(instance.lines[4] == "cam1: pictures and stamps belong together again");
 }
 
-TEST_CASE("live_verification: wrong stamps of the IMU are not laid to the cameras") {
+TEST_CASE("live_verification: wrong stamps of the IMU are not laid to the cameras",
+          "[statistics]") {
     MovingInstance instance;
     instance.open();
     auto settings = instance.settings();
