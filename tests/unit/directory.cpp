@@ -75,45 +75,48 @@ TEST_CASE("directory: another service is found by its rings, too, and named") {
 
 namespace {
 
-/// Beats on the clock of the process whose it is, as long as this lives.
-class BeatingHeart {
+/// Updates a heartbeat by the clock of its own writer, as long as this lives.
+class Heartbeat {
  public:
-    explicit BeatingHeart(Header& header)
+    explicit Heartbeat(Header& header)
         : thread_([this, &header] {
               while (!stop_) {
                   header.heartbeat_ns.fetch_add(50'000'000);
                   std::this_thread::sleep_for(std::chrono::milliseconds(50));
               }
           }) {}
-    ~BeatingHeart() {
+    ~Heartbeat() {
         stop_ = true;
         thread_.join();
     }
-    BeatingHeart(const BeatingHeart&) = delete;
-    BeatingHeart& operator=(const BeatingHeart&) = delete;
+    Heartbeat(const Heartbeat&) = delete;
+    Heartbeat& operator=(const Heartbeat&) = delete;
 
  private:
     std::atomic<bool> stop_{false};
     std::thread thread_;
 };
 
+/// A directory with a ring of this process.
+struct ServedDirectory {
+    test::TemporaryDirectory parent{"/dev/shm"};
+    std::filesystem::path path = parent.path() / "instance";
+    bool claimed = OwnedDirectory::claim(path).has_value();
+    Writer writer = *Writer::create(path, {"events", StreamKind::events, 8});
+    Mapping segment = *Mapping::open(path / "events", Mapping::Access::read_write);
+    Header& header = segment.header();
+};
+
 }  // namespace
 
-TEST_CASE("directory: a service that only its heart shows is found, too") {
-    test::TemporaryDirectory parent("/dev/shm");
-    const auto path = parent.path() / "instance";
-    REQUIRE(OwnedDirectory::claim(path));
-    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
-    REQUIRE(writer);
-    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
-    Header& header = segment->header();
+TEST_CASE_METHOD(ServedDirectory, "directory: a service that only its heartbeat shows is found") {
     SECTION("of another pid namespace") { ++header.pid_namespace; }
     SECTION("of another time namespace, whose clock is far off") {
         ++header.time_namespace;
         header.heartbeat_ns = (host_now() - seconds(500)).ns;
     }
     {
-        const BeatingHeart heart(header);
+        const Heartbeat heartbeat(header);
         CHECK_THAT(OwnedDirectory::claim(path).error().message(),
                    Catch::Contains("serves this instance (process"));
     }
@@ -124,15 +127,9 @@ TEST_CASE("directory: a service that only its heart shows is found, too") {
     CHECK(host_now() - begun < seconds(1));
 }
 
-TEST_CASE("directory: a heart that stopped long ago holds nobody up") {
-    test::TemporaryDirectory parent("/dev/shm");
-    const auto path = parent.path() / "instance";
-    REQUIRE(OwnedDirectory::claim(path));
-    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
-    REQUIRE(writer);
-    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
-    ++segment->header().pid_namespace;
-    segment->header().heartbeat_ns = (host_now() - seconds(4)).ns;
+TEST_CASE_METHOD(ServedDirectory, "directory: a heartbeat that stopped long ago delays nobody") {
+    ++header.pid_namespace;
+    header.heartbeat_ns = (host_now() - seconds(4)).ns;
     const HostTime begun = host_now();
     CHECK(OwnedDirectory::claim(path));
     CHECK(host_now() - begun < seconds(1));

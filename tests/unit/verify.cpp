@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "engine/pairing/recording.hpp"
 #include "verify/even_line.hpp"
 #include "verify/verification.hpp"
 
@@ -410,6 +411,28 @@ TEST_CASE("verify: a camera that begins to count anew still proves its frames") 
     // Without a clock of its own, nothing says which trigger a frame is of then.
     for (auto& arrival : arrivals) arrival.camera = {};
     CHECK(verdict_of(verify(drive.evidence()), "cam0").grade() == Grade::untrusted);
+}
+
+TEST_CASE("verify: triggers of two boots of the board are of two runs") {
+    CameraEvidence camera;
+    const auto add = [&](const pairing::Evidence& evidence) {
+        add_camera_evidence(pack(pairing::to_metadata(evidence)), camera);
+    };
+    pairing::Limits limits;
+    limits.period = milliseconds(50);
+    pairing::Exposure exposure;
+    exposure.trigger = 1;
+    add(limits);
+    add(exposure);
+    add(pairing::Reset{});  // of the camera: the board counts on
+    CHECK(camera.runs.size() == 1);
+    add(pairing::Reset{true});
+    add(exposure);
+    REQUIRE(camera.runs.size() == 2);
+    for (const CameraRun& run : camera.runs) {
+        CHECK(run.exposures.size() == 1);
+        CHECK(run.period == milliseconds(50));
+    }
 }
 
 TEST_CASE("verify: a recording that begins and ends between a frame and its evidence") {

@@ -9,12 +9,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/stream_names.hpp"
 #include "evaluate/camera_calibration.hpp"
 #include "evaluate/picture_offsets.hpp"
 #include "progress_line.hpp"
 #include "verify/offset_watch.hpp"
 #include "verify/picture_judge.hpp"
-#include "versavis/ring_path.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::client {
@@ -173,15 +173,10 @@ class LiveVerification {
         options.instance = settings_.instance;
         std::vector<std::string> imus;
         std::vector<std::string> frames;
-        std::error_code none;
-        const auto directory = instance_directory(settings_.instance);
-        for (const auto& entry : std::filesystem::directory_iterator(directory, none)) {
-            const std::string name = entry.path().filename().string();
-            if (name.front() == '.') continue;
+        for (const std::string& name : stream_names(settings_.instance)) {
             if (FrameStream::open(name, options)) frames.push_back(name);
             if (ImuStream::open(name, options)) imus.push_back(name);
         }
-        std::sort(frames.begin(), frames.end());
         const auto imu = settings_.imu.empty() && imus.size() == 1 ? imus.front() : settings_.imu;
         if (imu.empty() && imus.size() > 1)
             return failure("--imu", fmt::format("there are several: {}", fmt::join(imus, ", ")),
@@ -278,18 +273,16 @@ class LiveVerification {
             return other->watch() && other->watch()->departure() &&
                    absolute(other->watch()->departure()->by - departure.by) < least_departure;
         };
-        const bool all = std::all_of(cameras_.begin(), cameras_.end(), same);
-        const std::string either = fmt::format("its stamps or those of {} are wrong", imu_name_);
-        const std::string imu =
-            fmt::format("all cameras do, so the stamps of {} are wrong", imu_name_);
+        std::string what = "its stamps are wrong";
+        if (cameras_.size() == 1)
+            what = fmt::format("its stamps or those of {} are wrong", imu_name_);
+        else if (std::all_of(cameras_.begin(), cameras_.end(), same))
+            what = fmt::format("all cameras do, so the stamps of {} are wrong", imu_name_);
         return fmt::format(
             "{}: pictures and stamps differ by {:+.1f} +- {:.1f} ms since {}: {}; for the cause, "
             "record and run 'versavis verify'",
             camera.name(), ms(departure.by), ms(departure.sigma),
-            time_of_day(camera.latest() - departure.since),
-            !all                   ? "its stamps are wrong"
-            : cameras_.size() == 1 ? either
-                                   : imu);
+            time_of_day(camera.latest() - departure.since), what);
     }
 
     json to_json(const LiveCamera& camera, const StretchComparison& stretch) const {

@@ -17,6 +17,7 @@
 #include <random>
 #include <utility>
 
+#include "base/stream_names.hpp"
 #include "base/task_queue.hpp"
 #include "engine/toml/service_file.hpp"
 #include "record/item_writer.hpp"
@@ -194,18 +195,6 @@ class Recorder {
     std::uint64_t closed_bytes_ = 0;  ///< of files before this one
 };
 
-/// Those that are there, in alphabetical order.
-std::vector<std::string> streams_of(const std::string& instance) {
-    std::vector<std::string> names;
-    std::error_code error;
-    for (const auto& entry :
-         std::filesystem::directory_iterator(instance_directory(instance), error))
-        if (is_stream_name(entry.path().filename().string()))
-            names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    return names;
-}
-
 Expected<> Recorder::open_stream(const std::string& name, ring::Position start) {
     ring::Options options;
     options.start = start;
@@ -239,7 +228,7 @@ void Recorder::go_back() {
 
 Expected<> Recorder::open_streams() {
     const bool all = settings_.streams.empty();
-    for (const std::string& name : all ? streams_of(settings_.instance) : settings_.streams) {
+    for (const std::string& name : all ? stream_names(settings_.instance) : settings_.streams) {
         auto opened = is_stream_name(name)
                           ? open_stream(name, ring::Position::next)
                           : failure(name, "is not a name of a stream", "see 'versavis list'");
@@ -266,7 +255,7 @@ void Recorder::wait_for_streams() {
 void Recorder::look_for_streams() {
     if (!settings_.streams.empty()) return;
     bool found = false;
-    for (const std::string& name : streams_of(settings_.instance)) {
+    for (const std::string& name : stream_names(settings_.instance)) {
         const bool known = std::any_of(sources_.begin(), sources_.end(),
                                        [&](const auto& source) { return source->name == name; });
         if (!known && open_stream(name, ring::Position::oldest)) found = true;

@@ -68,51 +68,6 @@ CameraRun& newest_run(CameraEvidence& camera) {
     return camera.runs.back();
 }
 
-void add_camera_evidence(const ItemFields& item, CameraEvidence& camera) {
-    switch (item.u32(0)) {
-        case 1: {
-            CameraRun& run = camera.runs.emplace_back();
-            run.period = {item.i64(8)};
-            run.latest_arrival = {item.i64(24)};
-            break;
-        }
-        case 2: {
-            const ExposureEvidence each{item.u64(8),
-                                        {item.i64(24)},
-                                        {item.i64(32)},
-                                        {item.i64(72)},
-                                        item.at<std::uint8_t>(60) != 0};
-            if (possible(each.start, each.end, each.delay))
-                newest_run(camera).exposures.push_back(each);
-            break;
-        }
-        case 3: {
-            const ArrivalEvidence each{
-                item.u64(16), {item.i64(24)}, {item.i64(32)}, {item.i64(40)}};
-            if (possible(each.camera, each.arrived, each.exposure))
-                newest_run(camera).arrivals.push_back(each);
-            break;
-        }
-        case 6: {  // of the board, too: it counts anew
-            const CameraRun& before = newest_run(camera);
-            if (item.at<std::uint8_t>(8) != 0)
-                camera.runs.push_back({before.period, before.latest_arrival, {}, {}, {}});
-            break;
-        }
-        case 9: {
-            constexpr unsigned both_edges = 1;
-            const ExposureRecord record{item.u64(16),
-                                        {item.i64(40)},
-                                        {item.i64(48)},
-                                        (item.at<std::uint16_t>(10) & both_edges) != 0};
-            if (possible(record.start, record.end))  // an edge that is missing is no time
-                newest_run(camera).records.push_back(record);
-            break;
-        }
-        default: break;
-    }
-}
-
 StampedSample to_sample(const StampedItem& item, const ImuMetadata& imu) {
     return {item,         imu.board_time, imu.host_time, imu.number, imu.filter_delay,
             imu.sigma_ns, imu.epoch,      imu.flags};
@@ -174,8 +129,7 @@ void add_item(const RecordedItem& item, RecordedEvidence& evidence) {
             break;
         }
         case ring::StreamKind::evidence:
-            add_camera_evidence(ItemFields(item.metadata),
-                                named(evidence.cameras, camera_of(item.stream)));
+            add_camera_evidence(item.metadata, named(evidence.cameras, camera_of(item.stream)));
             break;
         case ring::StreamKind::clock:
             add_clock_item(ItemFields(item.metadata), evidence.clock);
@@ -185,6 +139,52 @@ void add_item(const RecordedItem& item, RecordedEvidence& evidence) {
 }
 
 }  // namespace
+
+void add_camera_evidence(const ring::Metadata& metadata, CameraEvidence& camera) {
+    const ItemFields item(metadata);
+    switch (item.u32(0)) {
+        case 1: {
+            CameraRun& run = camera.runs.emplace_back();
+            run.period = {item.i64(8)};
+            run.latest_arrival = {item.i64(24)};
+            break;
+        }
+        case 2: {
+            const ExposureEvidence each{item.u64(8),
+                                        {item.i64(24)},
+                                        {item.i64(32)},
+                                        {item.i64(72)},
+                                        item.at<std::uint8_t>(60) != 0};
+            if (possible(each.start, each.end, each.delay))
+                newest_run(camera).exposures.push_back(each);
+            break;
+        }
+        case 3: {
+            const ArrivalEvidence each{
+                item.u64(16), {item.i64(24)}, {item.i64(32)}, {item.i64(40)}};
+            if (possible(each.camera, each.arrived, each.exposure))
+                newest_run(camera).arrivals.push_back(each);
+            break;
+        }
+        case 6: {  // of the board, too: it counts anew
+            const CameraRun& before = newest_run(camera);
+            if (item.at<std::uint8_t>(8) != 0)
+                camera.runs.push_back({before.period, before.latest_arrival, {}, {}, {}});
+            break;
+        }
+        case 9: {
+            constexpr unsigned both_edges = 1;
+            const ExposureRecord record{item.u64(16),
+                                        {item.i64(40)},
+                                        {item.i64(48)},
+                                        (item.at<std::uint16_t>(10) & both_edges) != 0};
+            if (possible(record.start, record.end))  // an edge that is missing is no time
+                newest_run(camera).records.push_back(record);
+            break;
+        }
+        default: break;
+    }
+}
 
 Expected<RecordedEvidence> read_evidence(const Recording& recording,
                                          const std::function<bool()>& go_on) {

@@ -101,7 +101,7 @@ struct ArrivalEvidence {
     Duration exposure;  ///< as the camera states it; 0: it does not
 };
 
-/// One stream of a camera, from its beginning to the next one.
+/// One stream of a camera, from its beginning to the next one, within one boot of the board.
 struct CameraRun {
     Duration period;          ///< 0: not known
     Duration latest_arrival;  ///< after the end of the exposure, as the service allows
@@ -135,6 +135,9 @@ struct RecordedEvidence {
     MessageStamps message_stamps;
     std::string output_clock;  ///< as the service named it; empty: not known
 };
+
+/// One item of the stream <camera>-evidence (docs/contracts/shm-layout.md).
+void add_camera_evidence(const ring::Metadata& metadata, CameraEvidence& camera);
 
 /// Errors: the recording cannot be read or is damaged; stopped.
 Expected<RecordedEvidence> read_evidence(const Recording& recording,

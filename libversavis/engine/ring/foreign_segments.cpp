@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ring/foreign_segments.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <system_error>
@@ -16,8 +15,9 @@ namespace versavis::ring {
 
 namespace {
 
-/// Hearts beat once a second at least. If lower, a living writer is taken for dead, and two serve
-/// one instance; if higher, a service starts later where a dead one's container left rings.
+/// Writers update their heartbeat once a second at least. If lower, a living writer is taken for
+/// dead, and two serve one instance; if higher, a service starts later where a dead one's container
+/// left rings.
 constexpr Duration longest_pause = milliseconds(1100);
 
 constexpr auto between_looks = std::chrono::milliseconds(10);
@@ -26,29 +26,28 @@ std::int64_t heartbeat_of(const Mapping& mapping) {
     return mapping.header().heartbeat_ns.load(std::memory_order_relaxed);
 }
 
-/// A heart that beats by this process's clock, and has not done so for seconds, has stopped.
-bool may_beat(const Mapping& mapping) {
+/// A heartbeat that is old by this process's own clock has stopped.
+bool may_live(const Mapping& mapping) {
     const auto state = mapping.header().state.load(std::memory_order_relaxed);
     if (state != static_cast<std::uint32_t>(WriterState::live)) return false;
     return mapping.constants().time_namespace != own_namespaces().time ||
            Pulse().beats({heartbeat_of(mapping)}, host_now());
 }
 
-/// A writer that may live, and its last beat.
-struct Patient {
+/// A writer that may live, and its last heartbeat.
+struct Doubtful {
     ForeignSegment* segment;
-    std::int64_t beat;
+    std::int64_t heartbeat_ns;
 };
 
-void await_beats(std::vector<Patient> patients) {
+void await_heartbeats(std::vector<Doubtful> doubtful) {
     const HostTime deadline = deadline_after(longest_pause);
-    while (!patients.empty() && !is_over(deadline)) {
+    while (!doubtful.empty() && !is_over(deadline)) {
         std::this_thread::sleep_for(between_looks);
-        const auto beats = [](const Patient& patient) {
-            patient.segment->alive = heartbeat_of(patient.segment->mapping) != patient.beat;
-            return patient.segment->alive;
-        };
-        patients.erase(std::remove_if(patients.begin(), patients.end(), beats), patients.end());
+        std::erase_if(doubtful, [](const Doubtful& one) {
+            one.segment->alive = heartbeat_of(one.segment->mapping) != one.heartbeat_ns;
+            return one.segment->alive;
+        });
     }
 }
 
@@ -64,14 +63,14 @@ std::vector<ForeignSegment> foreign_segments(
         if (mapping && !is_own(mapping->constants()))
             found.push_back({entry.path(), std::move(*mapping)});
     }
-    std::vector<Patient> patients;
+    std::vector<Doubtful> doubtful;
     for (ForeignSegment& segment : found) {
         const Liveness seen = liveness(segment.mapping.constants());
         segment.alive = seen == Liveness::alive;
-        if (seen == Liveness::unknown && may_beat(segment.mapping))
-            patients.push_back({&segment, heartbeat_of(segment.mapping)});
+        if (seen == Liveness::unknown && may_live(segment.mapping))
+            doubtful.push_back({&segment, heartbeat_of(segment.mapping)});
     }
-    await_beats(std::move(patients));
+    await_heartbeats(std::move(doubtful));
     return found;
 }
 

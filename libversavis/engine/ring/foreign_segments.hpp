@@ -17,8 +17,8 @@ struct ForeignSegment {
     bool alive = false;  ///< its writer is
 };
 
-/// What `open` opens in `directory`, but for this process's own. Where nothing but its heart can
-/// show that a writer lives, the next beat is waited for: 1.1 s at most.
+/// What `open` opens in `directory`, but for this process's own. Where only its heartbeat can
+/// show that a writer lives, the next one is waited for: 1.1 s at most.
 std::vector<ForeignSegment> foreign_segments(
     const std::filesystem::path& directory,
     const std::function<Expected<Mapping>(const std::filesystem::path&)>& open);
