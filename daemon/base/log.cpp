@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "log.hpp"
 
-#include <sys/stat.h>
 #include <sys/uio.h>
 #include <systemd/sd-journal.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cstdint>
-#include <cstdlib>
 #include <vector>
+
+#include "posix/journal.hpp"
 
 namespace versavis::daemon {
 
@@ -25,15 +25,6 @@ const char* name(LogLevel level) {
         case LogLevel::debug: return "debug";
     }
     return "";
-}
-
-/// The variable is inherited by programs whose output leads elsewhere: only the stream that it
-/// names counts.
-bool standard_error_is_journal() {
-    const char* stream = std::getenv("JOURNAL_STREAM");
-    struct stat file {};
-    if (stream == nullptr || ::fstat(STDERR_FILENO, &file) != 0) return false;
-    return fmt::format("{}:{}", file.st_dev, file.st_ino) == stream;
 }
 
 }  // namespace
@@ -54,7 +45,7 @@ std::string message_id(std::string_view fault) {
 void log_line(LogLevel level, const std::string& subject, const std::string& text,
               const std::string& fault) {
     if (level > threshold.load()) return;
-    static const bool journal = standard_error_is_journal();
+    static const bool journal = is_journal(STDERR_FILENO);
     if (journal) {
         std::vector<std::string> fields{fmt::format("MESSAGE={}: {}", subject, text),
                                         fmt::format("PRIORITY={}", static_cast<int>(level)),

@@ -24,16 +24,16 @@ using Catch::StartsWith;
 
 namespace {
 
-constexpr std::uint32_t width = 160;
-constexpr std::uint32_t height = 120;
+constexpr std::uint32_t live_width = 160;
+constexpr std::uint32_t live_height = 120;
 constexpr Duration frame_period = milliseconds(100);
 constexpr Duration sample_period = milliseconds(5);
-constexpr HostTime scene_begin{1'000'000'000};
+constexpr HostTime live_begin{1'000'000'000};
 
 rig::CameraScenario scenario_of_camera() {
     rig::CameraScenario camera;
-    camera.width = width;
-    camera.height = height;
+    camera.width = live_width;
+    camera.height = live_height;
     camera.blur_steps = 1;
     camera.noise = 2;
     return camera;
@@ -62,7 +62,7 @@ class MovingInstance {
     void open() {
         for (std::size_t i = 0; i < 2; ++i)
             cameras[i] = make({fmt::format("cam{}", i), ring::StreamKind::frames, 16, 8,
-                               std::uint64_t{width} * height});
+                               std::uint64_t{live_width} * live_height});
         imu = make({"imu0", ring::StreamKind::imu, 1024});
     }
     void restart() {
@@ -88,14 +88,14 @@ class MovingInstance {
         view.paint(now - half, now + half, ++serial, picture);
         for (std::size_t i = 0; i < 2; ++i) {
             FrameMetadata frame{};
-            frame.width = frame.stride = width;
-            frame.height = height;
+            frame.width = frame.stride = live_width;
+            frame.height = live_height;
             frame.pixel_format = mono8;
             frame.epoch = epoch;
             const std::uint32_t slot = cameras[i]->acquire().value();
             std::copy(picture.begin(), picture.end(),
                       reinterpret_cast<std::uint8_t*>(cameras[i]->slot_data(slot)));
-            cameras[i]->publish(slot, width * height, {(now + late[i]).ns}, pack(frame));
+            cameras[i]->publish(slot, live_width * live_height, {(now + late[i]).ns}, pack(frame));
         }
     }
     /// Publishes until the second `end`; `turn` comes before each frame, with its second.
@@ -109,7 +109,7 @@ class MovingInstance {
             alarms += alarm ? 1 : 0;
         };
         made.stop = [this, end, turn = std::move(turn)] {
-            const double s = static_cast<double>((now - scene_begin).ns) * 1e-9;
+            const double s = static_cast<double>((now - live_begin).ns) * 1e-9;
             turn(s);
             publish();
             return s > end;
@@ -122,7 +122,7 @@ class MovingInstance {
     std::optional<ring::Writer> imu;
     std::array<Duration, 2> late{};  ///< of the stamps
     std::uint32_t epoch = 1;
-    HostTime now = scene_begin + seconds(1);
+    HostTime now = live_begin + seconds(1);
     std::vector<std::string> lines;
     int alarms = 0;
 
@@ -132,10 +132,11 @@ class MovingInstance {
     }
 
     rig::Scenario scenario = scenario_of_rig();
-    rig::Surroundings surroundings{scene_begin, scenario};
+    rig::Surroundings surroundings{live_begin, scenario};
     rig::CameraView view{scenario, scenario.cameras.front(), surroundings};
-    std::vector<std::uint8_t> picture = std::vector<std::uint8_t>(std::size_t{width} * height);
-    HostTime sampled = scene_begin;
+    std::vector<std::uint8_t> picture =
+        std::vector<std::uint8_t>(std::size_t{live_width} * live_height);
+    HostTime sampled = live_begin;
     std::uint64_t samples = 0;
     std::uint64_t serial = 0;
 };

@@ -86,11 +86,12 @@ class LiveCamera {
         }
         if (tracker_ && frame.time - followed_ < least_interval) return {};
         const auto view = frame.image();
-        if (!view || view->layout.channels == 0)
+        if (!view) return {};  // it has fewer pixels than it should
+        if (view->layout.channels == 0)
             return failure(name_,
                            fmt::format("its pixel format, {}, cannot be compared",
                                        pixel_format_name(frame.data.pixel_format)),
-                           "choose an unpacked one, such as Mono8");
+                           "choose an unpacked one, such as Mono8, or name the other cameras");
         const std::uint32_t factor = reduction(*view, least_width);
         GreyImage image = reduced_image(*view, factor);
         if (!frame.valid()) return {};  // overtaken by the writer while it was read
@@ -207,7 +208,9 @@ class LiveVerification {
 
     Expected<> wait_for(const std::vector<std::string>& cameras, const std::string& imu) {
         if (!waiting_)
-            fmt::print(stderr, "versavis: waiting for {} and {} of instance {}\n",
+            fmt::print(stderr,
+                       "versavis: waiting for {} and {} of instance {}; 'versavis list' shows what "
+                       "there is\n",
                        cameras.empty() ? "a camera" : fmt::format("{}", fmt::join(cameras, ", ")),
                        imu.empty() ? "an IMU" : imu, settings_.instance);
         waiting_ = true;

@@ -26,7 +26,8 @@ struct LiveVerificationSettings {
 
 /// Reads until it is stopped, and says what changes, or with `json` each comparison. Returns the
 /// worst that it saw: untrusted where pictures and stamps of a camera differed, plausible where a
-/// camera could not be judged. Errors: no calibration, no such camera.
+/// camera could not be judged. What is not there yet is waited for. Errors: no calibration, or none
+/// for these frames; several IMUs; pixels that cannot be read.
 Expected<Grade> verify_live(const LiveVerificationSettings& settings);
 
 }  // namespace versavis::client

@@ -3,15 +3,16 @@
 
 #include <fmt/format.h>
 #include <sysexits.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 
 #include "base/fail.hpp"
 #include "live_verification.hpp"
 #include "posix/file.hpp"
+#include "posix/journal.hpp"
 #include "verify/signature.hpp"
 #include "verify/verification.hpp"
 
@@ -89,7 +90,7 @@ int VerifyCommand::run(const std::string& instance) const {
 
 int VerifyCommand::verify_instance(const std::string& instance) const {
     // The journal takes this for the priority of the line (sd-daemon(3)).
-    const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
+    const bool journal = is_journal(STDOUT_FILENO);
     const auto say = [journal](const std::string& line, bool alarm) {
         fmt::print("{}{}\n", journal && alarm ? "<4>" : "", line);
         std::fflush(stdout);
