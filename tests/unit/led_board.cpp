@@ -22,8 +22,7 @@ Expected<LedPlace> find(LedBench& bench, int pictures, Duration exposure = milli
 }
 
 void check_place(const LedPlace& place, const std::vector<double>& leds) {
-    const bool swapped =
-        std::hypot(place.x1 - leds[0], place.y1 - leds[1]) > 5;  // either end may be first
+    const bool swapped = leds[2] < leds[0];  // the left end is the first one
     const std::size_t first = swapped ? 2 : 0;
     const std::size_t last = swapped ? 0 : 2;
     INFO(place.x1 << " " << place.y1 << " " << place.x2 << " " << place.y2);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "base/median.hpp"
@@ -264,6 +266,11 @@ Expected<LedPlace> LedSearch::find(const std::string& stream) const {
                        fmt::format("look at one with 'versavis export', and give the positions of "
                                    "the outermost LEDs: --board {}=X1,Y1,X2,Y2",
                                    stream));
+    // Spots come by size, which noise decides between the two.
+    if (std::tie(best.x2, best.y2) < std::tie(best.x1, best.y1)) {
+        std::swap(best.x1, best.x2);
+        std::swap(best.y1, best.y2);
+    }
     const double dark = median_gap(darkest_, best);
     const double radius = aperture * best.pitch();
     const Point first = centred(darkest_, {best.x1, best.y1}, radius, dark);

@@ -42,7 +42,8 @@ class LedSearch {
     void add(const GreyPicture& picture);
     unsigned pictures() const { return pictures_; }
 
-    /// Error, about `stream`: there is no board to be seen, or no picture.
+    /// The ends from left to right, or one above the other downwards. Error, about `stream`: there
+    /// is no board to be seen, or no picture.
     Expected<LedPlace> find(const std::string& stream) const;
 
  private:
