@@ -125,9 +125,12 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     translator_.heard(departures_, {departed, received}, fits);
     translator_.heard(samples_, {pulse.at, received}, fits);
     const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, impossible);
+    const Promptness promptness =
+        arrival ? delays_.of(arrival->delay, arrival->sigma) : Promptness::unknown;
     if (doubt) {
+        step_promptness_.doubted(promptness);
         if (!arrival || impossible || contact.contradicted ||
-            !may_adopt(*arrival, *doubt, contact.exchanges))
+            !may_adopt(promptness, *doubt, contact.exchanges))
             return doubt;
         pulse_filter_.adopt(pulse);
         delays_.forget();
@@ -136,9 +139,10 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     } else if (const auto by = departure()) {
         return Implausibility{EventReason::implausible_time, sample.time_ns,
                               sample.time_ns - by->ns};
-    } else if (arrival && delays_.of(arrival->delay, arrival->sigma) == Promptness::usual) {
+    } else if (promptness == Promptness::usual) {
         translator_.clock_continues();
     }
+    step_promptness_.believed();
     if (arrival) delays_.learn(arrival->delay, received);
     believed_life_ = clock_life_;
     return std::nullopt;
@@ -151,21 +155,23 @@ std::optional<Duration> ImuPipeline::departure() const {
 }
 
 /// The board lost count, or the part samples at other instants than it did.
-bool ImuPipeline::may_adopt(const ArrivalDelay& arrival, const Implausibility& doubt,
+bool ImuPipeline::may_adopt(Promptness promptness, const Implausibility& doubt,
                             std::uint64_t exchanges) const {
     // The clock began anew, and all with it.
     if (clock_life_ != believed_life_) return pulse_filter_.stepped(exchanges);
     const auto samples = translator_.confirms_others(samples_);
     const auto departures = translator_.confirms_others(departures_);
+    // Early though exchanges confirm them: the clock stepped, and the estimate does not know yet.
+    const bool early = step_promptness_.mostly_early();
     if (samples && departures)
-        return *samples && *departures
+        return *samples && *departures && !early
                    ? pulse_filter_.stepped(exchanges)
                    : pulse_filter_.prevailed(exchanges, clock::exchanges_to_believe);
-    const Promptness promptness = delays_.of(arrival.delay, arrival.sigma);
-    const bool decided = doubt.reason == EventReason::implausible_number
-                             ? promptness == Promptness::usual
-                             : arrival_confirms(promptness, {doubt.said - doubt.expected});
-    return decided ? pulse_filter_.stepped(exchanges) : pulse_filter_.prevailed(exchanges);
+    const bool confirmed = doubt.reason == EventReason::implausible_number
+                               ? promptness == Promptness::usual
+                               : arrival_confirms(promptness, {doubt.said - doubt.expected});
+    return confirmed && !early ? pulse_filter_.stepped(exchanges)
+                               : pulse_filter_.prevailed(exchanges);
 }
 
 void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample,

@@ -67,7 +67,7 @@ class ImuPipeline {
     void restart();
     std::optional<Implausibility> doubt(const wire::ImuSample& sample, HostTime received);
     std::optional<Duration> departure() const;
-    bool may_adopt(const ArrivalDelay& arrival, const Implausibility& doubt,
+    bool may_adopt(Promptness promptness, const Implausibility& doubt,
                    std::uint64_t exchanges) const;
     void adopt_number(std::uint32_t number);
     void journal(EventKind kind, const wire::ImuSample& sample, const Implausibility& doubt);
@@ -86,6 +86,7 @@ class ImuPipeline {
     std::size_t samples_;     ///< which may be off alone
     MajorityFilter<PulseHistory> pulse_filter_;
     DelayFloor delays_;  ///< of samples, from their departure
+    StepPromptness step_promptness_;
     std::uint32_t clock_life_ = 0;
     std::uint32_t believed_life_ = 0;  ///< of the clock, when a sample was believed last
     StampGuard guard_;

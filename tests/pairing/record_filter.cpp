@@ -291,3 +291,26 @@ TEST_CASE("record_filter: a step is believed when its delay confirms it, or noth
     INFO(off.ns << " ns, " << static_cast<int>(promptness));
     CHECK(records == believed_after);
 }
+
+TEST_CASE("record_filter: usual delays among more early ones do not confirm a step") {
+    RecordLimits limits = camera();
+    limits.fixed_grid = true;
+    RecordFilter filter{limits};
+    std::uint64_t tick = 0;
+    const auto judge = [&](Duration off, Promptness promptness) {
+        ReceivedRecord received;
+        ++tick;
+        received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), tick, off);
+        received.promptness = promptness;
+        received.exchanges = tick;
+        return filter.judge(received);
+    };
+    for (int i = 0; i < 50; ++i) CHECK_FALSE(judge({}, Promptness::usual).doubt);
+    for (int i = 0; i < 45; ++i) {
+        const bool held_up = i % 3 == 2;
+        CHECK(judge(milliseconds(1), held_up ? Promptness::usual : Promptness::early).doubt);
+    }
+    int usual = 0;
+    while (judge(milliseconds(1), Promptness::usual).doubt) ++usual;
+    CHECK(usual == 14);
+}

@@ -30,7 +30,8 @@ TEST_CASE("delay_floor: few messages, or a bad clock, decide nothing") {
     CHECK(bench.of(seconds(5)) == Promptness::unknown);
     bench.learn(1, microseconds(300));
     CHECK(bench.of(seconds(5)) == Promptness::late);
-    CHECK(bench.of(seconds(5), microseconds(40)) == Promptness::unknown);
+    CHECK(bench.of(microseconds(300), microseconds(40)) == Promptness::unknown);
+    CHECK(bench.of(microseconds(79), microseconds(40)) == Promptness::early);
     bench.floor.forget();
     CHECK(bench.of(seconds(5)) == Promptness::unknown);
 }
@@ -66,4 +67,25 @@ TEST_CASE("delay_floor: only what is larger than its tolerance is confirmed by a
     for (const Promptness other :
          {Promptness::not_recorded, Promptness::unknown, Promptness::early, Promptness::late})
         CHECK_FALSE(arrival_confirms(other, seconds(1)));
+}
+
+TEST_CASE("delay_floor: what most of them say counts for a step, and those late say nothing") {
+    StepPromptness promptness;
+    CHECK_FALSE(promptness.mostly_early());
+    const auto doubted = [&](int times, Promptness how) {
+        for (int i = 0; i < times; ++i) promptness.doubted(how);
+    };
+    doubted(3, Promptness::early);
+    doubted(2, Promptness::usual);
+    doubted(100, Promptness::late);
+    doubted(100, Promptness::unknown);
+    CHECK(promptness.mostly_early());
+    doubted(1, Promptness::usual);
+    CHECK_FALSE(promptness.mostly_early());
+    doubted(10'000, Promptness::early);
+    doubted(20, Promptness::usual);
+    CHECK_FALSE(promptness.mostly_early());
+    doubted(30, Promptness::early);
+    promptness.believed();
+    CHECK_FALSE(promptness.mostly_early());
 }

@@ -3,6 +3,7 @@
 #include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
+#include <random>
 
 #include "pipelines.hpp"
 
@@ -33,6 +34,7 @@ struct ImuBench : test::Pipelines {
         ImuConfiguration made;
         made.model = imu::find_model("adis16448b");
         made.filter_delay_us = 0;
+        made.data_ready = true;
         return made;
     }
     HostTime instant(std::int64_t i) const { return begin + milliseconds(5) * i; }
@@ -189,6 +191,37 @@ TEST_CASE("imu_pipeline: samples that agree in a new phase are taken if they als
     CHECK(unpack<ImuMetadata>(after[9].metadata).number == 419);
     CHECK(absolute(unpack<ImuMetadata>(after[9].metadata).host_time - (bench.instant(419) + said)) <
           microseconds(5));
+}
+
+TEST_CASE("imu_pipeline: on a busy host, a clock that steps does not pass for a new phase") {
+    ImuBench bench;
+    std::mt19937 random{1};
+    std::exponential_distribution<double> wait{1e-5};  // 0.1 ms in the mean
+    // The link is so slow that no message of a clock that is ahead by 0.9 ms is impossible.
+    const auto delay = [&] {
+        return microseconds(1200) + Duration{static_cast<std::int64_t>(wait(random))};
+    };
+    const Duration step = microseconds(900);
+    constexpr std::uint32_t stepped = 8000;
+    std::uint64_t before = 0;
+    for (std::uint32_t i = 0; i < stepped + 4000; ++i) {
+        const Duration off = i < stepped ? Duration{} : step;
+        const HostTime host = bench.instant(i);
+        const BoardTime board = test::Pipelines::to_board(host) + off;
+        if (i % 20 == 0) bench.translator.add({host - delay(), board, board, host + delay()});
+        const HostTime arrived = host + delay() + (i % 4 == 3 ? step : Duration{});  // held up
+        if (bench.pipeline.add(sample(i, board), arrived)) bench.translator.add({board, arrived});
+        for (const ring::Item& item : bench.published()) {
+            if (i < stepped) ++before;
+            const auto metadata = unpack<ImuMetadata>(item.metadata);
+            const Duration error =
+                metadata.host_time - bench.instant(static_cast<std::int64_t>(metadata.number));
+            INFO(metadata.number << " is off by " << error.ns << ", sigma " << metadata.sigma_ns);
+            CHECK((absolute(error).ns < 4 * std::int64_t{metadata.sigma_ns} + 100'000 ||
+                   (metadata.flags & flag_holdover) != 0));
+        }
+    }
+    CHECK(before > stepped - 100);
 }
 
 TEST_CASE("imu_pipeline: a part that is set up anew samples in a phase of its own at once") {

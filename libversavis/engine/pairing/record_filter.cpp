@@ -301,21 +301,25 @@ RecordVerdict RecordFilter::judge(const ReceivedRecord& received) {
         arrival = {received.arrival, newest_instant(received.record).ns, received.expected_ns};
     verdict_.doubt = filter_.judge(received, received.exchanges, arrival);
     verdict_.overturned = filter_.overturned();
+    if (verdict_.doubt) step_promptness_.doubted(received.promptness);
     if (verdict_.doubt && !arrival && !received.clock_contradicted &&
         may_adopt(received, *verdict_.doubt)) {
         filter_.adopt(received);
         verdict_.step = std::exchange(verdict_.doubt, std::nullopt);
     }
+    if (!verdict_.doubt) step_promptness_.believed();
     if (verdict_.doubt && received.commanded.ns == 0) filter_.believed().see(received.record);
     return verdict_;
 }
 
 bool RecordFilter::may_adopt(const ReceivedRecord& received, const Implausibility& doubt) {
     if (received.promptness == Promptness::not_recorded) return filter_.stepped(received.exchanges);
-    const bool decided = doubt.reason == EventReason::implausible_number
-                             ? filter_.believed().only_skips(received.record)
-                             : arrival_confirms(received.promptness, {doubt.said - doubt.expected});
-    return decided ? filter_.stepped(received.exchanges) : filter_.prevailed(received.exchanges);
+    const bool confirmed =
+        doubt.reason == EventReason::implausible_number
+            ? filter_.believed().only_skips(received.record)
+            : arrival_confirms(received.promptness, {doubt.said - doubt.expected}) &&
+                  !step_promptness_.mostly_early();
+    return confirmed ? filter_.stepped(received.exchanges) : filter_.prevailed(received.exchanges);
 }
 
 }  // namespace versavis::pairing

@@ -175,6 +175,7 @@ class RecordFilter {
 
     RecordLimits limits_;
     MajorityFilter<RecordHistory> filter_;
+    StepPromptness step_promptness_;
     RecordVerdict verdict_;
 };
 

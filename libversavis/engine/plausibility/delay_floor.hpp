@@ -29,16 +29,36 @@ inline bool arrival_confirms(Promptness promptness, Duration apart) {
     return promptness == Promptness::usual && absolute(apart) > usual_delay_tolerance * 4;
 }
 
+/// Whether messages that do not fit those before them took as long as usual. One alone may seem to:
+/// if the board's clock stepped forward, one that waited for as long as the step is large. So most
+/// of them must. Not thread-safe.
+class StepPromptness {
+ public:
+    void doubted(Promptness promptness) {
+        if (promptness == Promptness::usual) score_ = std::min(score_ + 1, furthest);
+        if (promptness == Promptness::early) score_ = std::max(score_ - 1, -furthest);
+    }
+    void believed() { score_ = 0; }
+    bool mostly_early() const { return score_ < 0; }
+
+ private:
+    /// Half: a busy host more often delays so many in a row. Twice: a step that is followed by the
+    /// estimate is believed after twice as many messages.
+    static constexpr int furthest = 16;
+
+    int score_ = 0;
+};
+
 /// Not thread-safe.
 class DelayFloor {
  public:
     /// `sigma`: of the clock that `delay` is measured with.
     Promptness of(Duration delay, Duration sigma) const {
-        if (count_ < messages_to_know || sigma * sigmas > usual_delay_tolerance)
-            return Promptness::unknown;
+        if (count_ < messages_to_know) return Promptness::unknown;
         const Duration allowed = usual_delay_tolerance + sigma * sigmas;
         if (delay < least_ - allowed) return Promptness::early;
-        return delay > least_ + allowed ? Promptness::late : Promptness::usual;
+        if (delay > least_ + allowed) return Promptness::late;
+        return sigma * sigmas > usual_delay_tolerance ? Promptness::unknown : Promptness::usual;
     }
 
     /// Of a message that is believed.
