@@ -21,7 +21,9 @@ struct Link {
     /// By which stamps of the board are later than the truth, at a second of the test.
     std::function<Duration(double)> lie_of_exchanges = [](double) { return Duration{}; };
     std::function<Duration(double)> lie_of_stream = [](double) { return Duration{}; };  ///< the 0th
+    std::function<Duration(double)> lie_of_others = [](double) { return Duration{}; };
     std::size_t talking = stream_count;  ///< streams that do
+    std::size_t unfit = 0;               ///< of them, the first: theirs do not fit those before
 
     StreamWitnesses witnesses;
     std::mt19937_64 random{1};
@@ -42,12 +44,12 @@ struct Link {
         return least_delay + microseconds(1) * std::llround(spread(random));
     }
     void hear(std::size_t stream, HostTime at) {
-        const Duration lie = stream == 0 ? lie_of_stream(elapsed_s) : Duration{};
+        const Duration lie = (stream == 0 ? lie_of_stream : lie_of_others)(elapsed_s);
         const BoardTime said = board(at) + lie;
         // A larger message takes longer.
         const HostTime arrived =
             at + delay() + microseconds(10) * static_cast<std::int64_t>(stream);
-        witnesses.heard(stream, {said, {arrived.ns - said.ns}}, true);
+        witnesses.heard(stream, {said, {arrived.ns - said.ns}}, stream >= unfit);
     }
     void exchange() {
         const Duration lie = lie_of_exchanges(elapsed_s);
@@ -209,4 +211,37 @@ TEST_CASE("stream_witnesses: messages beside those that fit are confirmed by the
         link.witnesses.heard(0, {said, {arrived.ns - said.ns}}, false);
     }
     CHECK(link.witnesses.confirms_others(0) == (off == Duration{}));
+}
+
+TEST_CASE("stream_witnesses: a clock step is what no stream denies and the exchanges confirm") {
+    Link link;
+    link.least_delay = milliseconds(2);  // longer than the step
+    link.spread_us = 100;
+    link.run(seconds(20));
+    CHECK_FALSE(link.witnesses.show_clock_step());
+    const Duration step = GENERATE(-microseconds(900), microseconds(900));
+    const auto stepped = [&](double) { return step; };
+    link.unfit = stream_count;
+    SECTION("the clock") {
+        link.lie_of_stream = link.lie_of_others = link.lie_of_exchanges = stepped;
+        int tenths = 0;
+        for (; !link.witnesses.show_clock_step() && tenths < 50; ++tenths)
+            link.run(milliseconds(100));
+        CHECK(tenths <= (step.ns > 0 ? 4 : 18));  // until no answer of before is the quickest
+        link.witnesses.clock_stepped();
+        link.unfit = 0;
+    }
+    SECTION("one stream and the exchanges") {
+        link.lie_of_stream = link.lie_of_exchanges = stepped;
+        link.unfit = 1;
+    }
+    SECTION("all streams") { link.lie_of_stream = link.lie_of_others = stepped; }
+    SECTION("all, but one stream denies it") {
+        link.lie_of_stream = link.lie_of_others = link.lie_of_exchanges = stepped;
+        link.unfit = stream_count - 1;
+    }
+    for (int i = 0; i < 100; ++i) {
+        link.run(milliseconds(100));
+        REQUIRE_FALSE(link.witnesses.show_clock_step());
+    }
 }

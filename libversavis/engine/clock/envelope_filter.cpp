@@ -193,6 +193,11 @@ void EnvelopeFilter::board_restarted() {
     begun_ = confirmed_ = false;
 }
 
+void EnvelopeFilter::clock_stepped() {
+    ++restarts_;
+    board_restarted();
+}
+
 void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     const double kept_skew = std::abs(state_.mean[1]) < largest_skew ? state_.mean[1] : 0;
     reference_ = middle(exchange.received, exchange.answered);

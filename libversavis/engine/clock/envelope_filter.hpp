@@ -50,6 +50,9 @@ class EnvelopeFilter {
     /// The board restarted: its clock starts over, with the same crystal and link.
     void board_restarted();
 
+    /// It stepped while the board ran: the next exchange begins the estimate anew.
+    void clock_stepped();
+
     /// A message that is no exchange, and took as long as usual, shows that the board's clock did
     /// not step.
     void clock_continues() { continued_ = true; }

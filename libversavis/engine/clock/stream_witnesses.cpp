@@ -49,8 +49,9 @@ constexpr std::size_t answers_to_compare = 16;
 /// wrong answer is among the newest for two.
 constexpr std::size_t intervals_to_be_late = 3;
 
-/// Streams that must agree that exchanges are wrong: one alone may be wrong itself.
-constexpr int streams_to_doubt = 2;
+/// Streams that must agree that exchanges are wrong, or the clock stepped: one alone may be wrong
+/// itself.
+constexpr int streams_to_agree = 2;
 
 /// The answer on its way to the host.
 OffsetSample up(const Exchange& exchange) {
@@ -96,6 +97,13 @@ void StreamWitnesses::Interval::add(const OffsetSample& message) {
 void StreamWitnesses::Track::close() {
     closed.push_front(std::exchange(open, {}));
     if (closed.size() > most_intervals) closed.pop_back();
+}
+
+/// For long enough that older messages are past.
+bool StreamWitnesses::Track::silent() const {
+    return closed.size() >= intervals_to_end &&
+           std::all_of(closed.begin(), closed.begin() + intervals_to_end,
+                       [](const Interval& interval) { return interval.messages == 0; });
 }
 
 std::optional<OffsetSample> StreamWitnesses::Track::quickest(const StreamWitnesses& at) const {
@@ -199,7 +207,7 @@ bool StreamWitnesses::too_new() const {
         ++talking;
         known += stream.lead.known() ? 1 : 0;
     }
-    return talking >= streams_to_doubt && known < streams_to_doubt;
+    return talking >= streams_to_agree && known < streams_to_agree;
 }
 
 /// The least of what all streams that may be compared are off by to the same side; 0: they are not.
@@ -213,7 +221,7 @@ Duration StreamWitnesses::common(Duration Stream::*off) const {
         if (streams == 0 || absolute(by) < absolute(least)) least = by;
         ++streams;
     }
-    return streams < streams_to_doubt ? Duration{} : absolute(least);
+    return streams < streams_to_agree ? Duration{} : absolute(least);
 }
 
 void StreamWitnesses::compare(Stream& stream, const Answers& quickest_answers, HostTime now) {
@@ -257,6 +265,15 @@ bool StreamWitnesses::steers(std::size_t stream) const {
 std::optional<bool> StreamWitnesses::confirms_others(std::size_t stream) const {
     if (!streams_[stream].lead.known()) return std::nullopt;
     return streams_[stream].others_confirmed;
+}
+
+bool StreamWitnesses::show_clock_step() const {
+    int confirmed = 0;
+    for (const Stream& stream : streams_) {
+        if (!stream.fitting.silent()) return false;
+        confirmed += stream.witness && stream.others_confirmed ? 1 : 0;
+    }
+    return confirmed >= streams_to_agree;
 }
 
 void StreamWitnesses::clock_stepped() {

@@ -79,6 +79,11 @@ class StreamWitnesses {
     /// little is known.
     std::optional<bool> confirms_others(std::size_t stream) const;
 
+    /// No stream has messages any more that fit those before, and those of two or more agree with
+    /// the exchanges: it is the board's clock that stepped, even where the link takes longer than
+    /// the step is large.
+    bool show_clock_step() const;
+
     /// Messages of before cannot be compared with later ones. The link is the same.
     void clock_stepped();
 
@@ -100,6 +105,7 @@ class StreamWitnesses {
         std::deque<Interval> closed;  ///< the newest in front
 
         void close();
+        bool silent() const;
         std::optional<OffsetSample> quickest(const StreamWitnesses& at) const;
     };
     struct Stream {

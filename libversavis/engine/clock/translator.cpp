@@ -74,6 +74,10 @@ void Translator::add(const Exchange& exchange) {
     filter_.add(exchange, witnesses_.deny(exchange));
     if (filter_.restarts() != restarts) witnesses_.clock_stepped();
     witnesses_.exchanged(exchange, filter_.skew());
+    if (witnesses_.show_clock_step()) {
+        filter_.clock_stepped();
+        witnesses_.clock_stepped();
+    }
     filter_.doubt(witnesses_.doubt(), witnesses_.allowance());
 }
 
