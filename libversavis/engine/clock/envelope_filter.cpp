@@ -20,6 +20,14 @@ constexpr std::int64_t longest_slot_ns = 2'000'000'000;
 // minutes changes by a tenth with IMU packets.
 constexpr std::int64_t slots_per_age = 16;
 
+// Messages within this are delayed by the same load of the host: what a shorter slot says is not
+// independent of the one before, and counts by its share of this. Half: sigma is too small by a
+// quarter in the first minute. Twice: too large by a fifth from 2 to 8 s.
+constexpr double shared_load_s = 0.25;
+
+// The least such share. Half: errors of the first second grow by a tenth. Twice is the whole.
+constexpr double least_share = 0.5;
+
 // The bound counts the shortest round trip of one to two of these. Half or twice: it follows a
 // changed link sooner or later; the estimate does not depend on it.
 constexpr std::int64_t window_ns = 300'000'000'000;
@@ -264,6 +272,8 @@ void EnvelopeFilter::close_slot_if_due(BoardTime now) {
 }
 
 void EnvelopeFilter::close_slot(BoardTime now) {
+    const double length_s = static_cast<double>((now - slot_begin_).ns) * 1e-9;
+    slot_share_ = std::clamp(length_s / shared_load_s, least_share, 1.0);
     slot_begin_ = now;
     down_in_slot_ = false;
     ++slots_;
@@ -346,8 +356,8 @@ void EnvelopeFilter::move(const OffsetSample& sample, const DelayEdge& edge) {
     const Influence influence =
         influence_of(excess, std::max(deviation(), -excess / surprising), edge.scale_ns());
     const StateVector gain = matrix(state_) * direction;
-    vector(state_) += gain * influence.score;
-    matrix(state_) -= influence.curvature * gain * gain.transpose();
+    vector(state_) += gain * (slot_share_ * influence.score);
+    matrix(state_) -= slot_share_ * influence.curvature * gain * gain.transpose();
     // No delay is negative; left alone, both edges could slide below what they bound.
     if (state_.mean[3] < 0)
         vector(state_) -= matrix(state_).col(3) * (state_.mean[3] / matrix(state_)(3, 3));

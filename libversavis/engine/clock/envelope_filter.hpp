@@ -29,9 +29,10 @@ struct EdgeSite {
 /// is kept. Neither can be below its edge, the shortest delay that the link has; so each pushes the
 /// estimate when it comes close to the edge, by as much as the spread of the last slots' delays
 /// justifies (moment matching of a Gaussian with an exponentially modified one; T. Minka,
-/// Expectation propagation for approximate Bayesian inference, 2001). Delays far above the edge
-/// count for nothing, in whatever direction and however many. Nothing is gated out: outliers widen
-/// the state before it is used, and messages that arrived before they were sent restart it. A pure
+/// Expectation propagation for approximate Bayesian inference, 2001), and by less in the first
+/// slots, which share the load of the host (a tempered likelihood). Delays far above the edge count
+/// for nothing, in whatever direction and however many. Nothing is gated out: outliers widen the
+/// state before it is used, and messages that arrived before they were sent restart it. A pure
 /// function of its input stamps. Not thread-safe; Translator calls it under its lock.
 class EnvelopeFilter {
  public:
@@ -126,8 +127,9 @@ class EnvelopeFilter {
     Duration smallest_in_window_{INT64_MAX};
     Duration smallest_before_{INT64_MAX};
     bool down_in_slot_ = false;
-    double recent_surprises_ = 0;         ///< fading
-    int contradictions_ = 0;              ///< exchanges in a row
+    double slot_share_ = 1;        ///< of what its messages would say if slots were independent
+    double recent_surprises_ = 0;  ///< fading
+    int contradictions_ = 0;       ///< exchanges in a row
     int unwitnessed_contradictions_ = 0;  ///< of them, the newest in a row
     Persistence persistence_;             ///< of contradicting exchanges
     HostTime last_comparison_;

@@ -274,7 +274,7 @@ std::vector<Regime> regimes() {
     Settings reset = usb(0, seconds(200));
     reset.board_begin = seconds(1000);
     reset.board_reset = TrueTime{seconds(100).ns};
-    add("board restarts", reset);
+    add("board restarts", reset).seeds = 24;
     add("output clock steps", usb(0, seconds(200))).output_stepped = TrueTime{seconds(100).ns};
     const UsbSettings unequal{.longer_to_host = microseconds(200)};
     add("PPS from the middle on", usb(200, seconds(200), unequal)).pulses = {{seconds(100).ns},
