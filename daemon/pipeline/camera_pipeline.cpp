@@ -65,7 +65,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       index_(index),
       translator_(translator),
       events_(events),
-      stream_(translator.add_stream()),
+      stream_(translator.add_stream(clock::Witness::grid)),
       configuration_(configuration),
       frames_(configuration),
       evidence_(translator),

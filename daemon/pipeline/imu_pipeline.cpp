@@ -40,8 +40,8 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
-      departures_(translator.add_stream()),
-      samples_(translator.add_stream(false)),
+      departures_(translator.add_stream(clock::Witness::own)),
+      samples_(translator.add_stream(clock::Witness::none)),
       pulse_filter_(history(configuration), samples_to_confirm) {
     report_.name = configuration.name;
     report_.model = model_.name;

@@ -262,20 +262,36 @@ TEST_CASE("record_filter: a fixed grid is where it was after a new start of the 
     CHECK(believes(42, milliseconds(1)));
 }
 
-TEST_CASE("record_filter: a step is believed when its delay confirms it, or nothing but time can") {
-    RecordLimits limits = camera();
-    limits.fixed_grid = true;
-    RecordFilter filter{limits};
-    std::uint64_t tick = 0;
-    const auto judge = [&](Duration off, Promptness promptness) {
+namespace {
+
+/// A camera on a fixed grid, after 50 records: one per tick, and an exchange with each.
+struct SteppedCamera {
+    SteppedCamera() {
+        for (int i = 0; i < 50; ++i) CHECK(believes({}, Promptness::usual));
+    }
+
+    static RecordLimits limits() {
+        RecordLimits limits = camera();
+        limits.fixed_grid = true;
+        return limits;
+    }
+    bool believes(Duration off, Promptness promptness) {
         ReceivedRecord received;
         ++tick;
         received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), tick, off);
         received.promptness = promptness;
         received.exchanges = tick;
-        return filter.judge(received);
-    };
-    for (int i = 0; i < 50; ++i) CHECK_FALSE(judge({}, Promptness::usual).doubt);
+        return !filter.judge(received).doubt;
+    }
+
+    RecordFilter filter{limits()};
+    std::uint64_t tick = 0;
+};
+
+}  // namespace
+
+TEST_CASE("record_filter: a step is believed when its delay confirms it, or nothing but time can") {
+    SteppedCamera bench;
     struct Step {
         Duration off;
         Promptness promptness;
@@ -287,30 +303,19 @@ TEST_CASE("record_filter: a step is believed when its delay confirms it, or noth
         Step{microseconds(300), Promptness::usual, 97},
         Step{milliseconds(1), Promptness::unknown, 97});
     std::uint64_t records = 1;
-    while (judge(off, promptness).doubt && records < 1000) ++records;
+    while (!bench.believes(off, promptness) && records < 1000) ++records;
     INFO(off.ns << " ns, " << static_cast<int>(promptness));
     CHECK(records == believed_after);
 }
 
 TEST_CASE("record_filter: usual delays among more early ones do not confirm a step") {
-    RecordLimits limits = camera();
-    limits.fixed_grid = true;
-    RecordFilter filter{limits};
-    std::uint64_t tick = 0;
-    const auto judge = [&](Duration off, Promptness promptness) {
-        ReceivedRecord received;
-        ++tick;
-        received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), tick, off);
-        received.promptness = promptness;
-        received.exchanges = tick;
-        return filter.judge(received);
-    };
-    for (int i = 0; i < 50; ++i) CHECK_FALSE(judge({}, Promptness::usual).doubt);
+    SteppedCamera bench;
     for (int i = 0; i < 45; ++i) {
         const bool held_up = i % 3 == 2;
-        CHECK(judge(milliseconds(1), held_up ? Promptness::usual : Promptness::early).doubt);
+        CHECK_FALSE(
+            bench.believes(milliseconds(1), held_up ? Promptness::usual : Promptness::early));
     }
     int usual = 0;
-    while (judge(milliseconds(1), Promptness::usual).doubt) ++usual;
+    while (!bench.believes(milliseconds(1), Promptness::usual)) ++usual;
     CHECK(usual == 14);
 }

@@ -489,7 +489,8 @@ TEST_CASE_METHOD(RecordedInstance, "recorder: a full disk ends it, and what came
                report->stopped_early->message().find("free some") != std::string::npos;
     }));
     const Frames frames = frames_in(settings.output);
-    CHECK(frames.numbers.size() > 100);  // 900, but a busy machine loses some on the way
+    // All but the chunk that does not fit any more, of 4 MiB, or less where it ends by its age.
+    CHECK(frames.numbers.size() > 350);
     CHECK(frames.right);
     std::uint64_t reported = 0;
     std::ifstream(files.path() / "reported") >> reported;

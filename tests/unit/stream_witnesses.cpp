@@ -31,7 +31,8 @@ struct Link {
     double elapsed_s = 0;
 
     Link() {
-        for (std::size_t i = 0; i < stream_count; ++i) witnesses.add_stream(true);
+        for (const Witness witness : {Witness::grid, Witness::grid, Witness::own})
+            witnesses.add_stream(witness);
     }
 
     static constexpr double skew_ns_per_s = 20'000;
@@ -230,6 +231,10 @@ TEST_CASE("stream_witnesses: a clock step is what no stream denies and the excha
         CHECK(tenths <= (step.ns > 0 ? 4 : 18));  // until no answer of before is the quickest
         link.witnesses.clock_stepped();
         link.unfit = 0;
+    }
+    SECTION("the trigger grid alone") {
+        link.talking = 2;
+        link.run(seconds(5));
     }
     SECTION("one stream and the exchanges") {
         link.lie_of_stream = link.lie_of_exchanges = stepped;

@@ -258,7 +258,8 @@ namespace {
 /// of 200 Hz, over a link whose delays spread by half a millisecond.
 struct Board {
     Translator translator{*OutputClock::create(OutputClockKind::monotonic_raw)};
-    std::size_t streams[2]{translator.add_stream(), translator.add_stream()};
+    std::size_t streams[2]{translator.add_stream(Witness::grid),
+                           translator.add_stream(Witness::own)};
     std::mt19937_64 random{1};
     HostTime now{1'000'000'000'000};
     Duration offset = -seconds(5);

@@ -128,7 +128,7 @@ void StreamWitnesses::Stream::forget_lead() {
     late = 0;
 }
 
-std::size_t StreamWitnesses::add_stream(bool witness) {
+std::size_t StreamWitnesses::add_stream(Witness witness) {
     streams_.emplace_back();
     streams_.back().witness = witness;
     return streams_.size() - 1;
@@ -195,7 +195,7 @@ void StreamWitnesses::close_interval(HostTime now) {
 }
 
 bool StreamWitnesses::talks(const Stream& stream) const {
-    return stream.witness && stream.fitting.quickest(*this);
+    return stream.witness != Witness::none && stream.fitting.quickest(*this);
 }
 
 /// Streams enough talk, and it is not yet known how long they usually take.
@@ -268,12 +268,15 @@ std::optional<bool> StreamWitnesses::confirms_others(std::size_t stream) const {
 }
 
 bool StreamWitnesses::show_clock_step() const {
-    int confirmed = 0;
+    int own = 0;
+    bool grid = false;
     for (const Stream& stream : streams_) {
         if (!stream.fitting.silent()) return false;
-        confirmed += stream.witness && stream.others_confirmed ? 1 : 0;
+        if (!stream.others_confirmed) continue;
+        if (stream.witness == Witness::own) ++own;
+        if (stream.witness == Witness::grid) grid = true;
     }
-    return confirmed >= streams_to_agree;
+    return own + (grid ? 1 : 0) >= streams_to_agree;
 }
 
 void StreamWitnesses::clock_stepped() {

@@ -18,6 +18,14 @@ namespace versavis::clock {
 /// Half a minute of ten exchanges a second, until messages are believed that no answer confirms.
 constexpr std::uint64_t exchanges_to_believe = 300;
 
+/// What a stream can say of others.
+enum class Witness : std::uint8_t {
+    none,  ///< nothing: its times may be off alone
+    grid,  ///< whether exchanges are right; its instants are on the trigger grid, with the other
+           ///< cameras', and all of them may step without the clock
+    own,   ///< the same, and its instants follow no other stream's
+};
+
 /// How much longer than answers the quickest messages of a stream take.
 class UsualLead {
  public:
@@ -45,8 +53,8 @@ class UsualLead {
 /// Not thread-safe; Translator calls it under its lock.
 class StreamWitnesses {
  public:
-    /// The number of a new stream. `witness`: counts when exchanges are in doubt.
-    std::size_t add_stream(bool witness);
+    /// The number of a new stream.
+    std::size_t add_stream(Witness witness);
 
     /// A message and whether it fits those of its stream before it.
     void heard(std::size_t stream, const OffsetSample& message, bool fits);
@@ -80,8 +88,8 @@ class StreamWitnesses {
     std::optional<bool> confirms_others(std::size_t stream) const;
 
     /// No stream has messages any more that fit those before, and those of two or more agree with
-    /// the exchanges: it is the board's clock that stepped, even where the link takes longer than
-    /// the step is large.
+    /// the exchanges, of which one at most is on the trigger grid: it is the board's clock that
+    /// stepped, even where the link takes longer than the step is large.
     bool show_clock_step() const;
 
     /// Messages of before cannot be compared with later ones. The link is the same.
@@ -117,7 +125,7 @@ class StreamWitnesses {
         std::size_t late = 0;     ///< intervals in a row
         Persistence persistence;  ///< of what departs
         bool others_confirmed = false;
-        bool witness = true;
+        Witness witness = Witness::own;
 
         void forget_lead();
     };
@@ -125,7 +133,7 @@ class StreamWitnesses {
     Duration aligned(const OffsetSample& sample) const;
     Duration quickest_answer(std::size_t newest) const;
     void close_interval(HostTime now);
-    bool talks(const Stream& witness) const;
+    bool talks(const Stream& stream) const;
     bool too_new() const;
     Duration common(Duration Stream::*off) const;
     void compare(Stream& stream, const Answers& quickest_answers, HostTime now);

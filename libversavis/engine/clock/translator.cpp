@@ -81,7 +81,7 @@ void Translator::add(const Exchange& exchange) {
     filter_.doubt(witnesses_.doubt(), witnesses_.allowance());
 }
 
-std::size_t Translator::add_stream(bool witness) {
+std::size_t Translator::add_stream(Witness witness) {
     const std::lock_guard lock(mutex_);
     return witnesses_.add_stream(witness);
 }

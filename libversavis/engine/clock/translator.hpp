@@ -109,9 +109,8 @@ class Translator {
     void clock_continues();
 
     /// A stream of messages that are compared with the exchanges, those of the other streams, and
-    /// each other: see StreamWitnesses. `witness`: counts when exchanges are in doubt. `fits`: it
-    /// agrees with those of its stream before it.
-    std::size_t add_stream(bool witness = true);
+    /// each other: see StreamWitnesses. `fits`: it agrees with those of its stream before it.
+    std::size_t add_stream(Witness witness);
     void heard(std::size_t stream, const OneWay& message, bool fits);
     std::optional<Duration> departure(std::size_t stream) const;
     bool steers(std::size_t stream) const;
