@@ -7,10 +7,10 @@
 
 static void print(const versavis_item* item) {
     if (item->kind == VERSAVIS_EVENTS)
-        printf("%" PRId64 " ns: %s %s\n", item->time, item->data.event.source_name,
+        printf("%" PRId64 " ns: %s %s\n", item->time.ns, item->data.event.source_name,
                versavis_event_name(item->data.event.kind));
     else
-        printf("%" PRId64 " ns: a frame of %zu bytes\n", item->time, item->payload_size);
+        printf("%" PRId64 " ns: a frame of %zu bytes\n", item->time.ns, item->payload_size);
     fflush(stdout);
 }
 

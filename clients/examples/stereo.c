@@ -9,7 +9,8 @@ int main(void) {
     versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;
     versavis_error error;
     versavis_sets* sets;
-    static versavis_set set = VERSAVIS_SET_INIT;
+    versavis_set set = VERSAVIS_SET_INIT;
+    versavis_item frames[] = {VERSAVIS_ITEM_INIT, VERSAVIS_ITEM_INIT};
     options.imu = "imu0";
     if (versavis_sets_open(NULL, cameras, 2, &options, &sets, &error) != VERSAVIS_OK) {
         fprintf(stderr, "%s\n", error.message);
@@ -22,10 +23,12 @@ int main(void) {
             if (result < 0) return 1;
             continue;
         }
-        /* ... use versavis_view(&set.frames[0], &image) and set.frames[1] here ... */
-        if (!versavis_valid(&set.frames[0]) || !versavis_valid(&set.frames[1])) continue;
+        for (uint32_t camera = 0; camera < 2; ++camera)
+            if (versavis_set_frame(&set, camera, &frames[camera]) != VERSAVIS_OK) return 1;
+        /* ... use versavis_view(&frames[0], &image) here ... */
+        if (!versavis_set_valid(&set)) continue; /* too slow: the writer needed the memory */
         printf("tick %" PRIu64 ": %" PRId64 " ns, spread %" PRId64 " ns, %zu samples\n", set.tick,
-               set.time, set.spread, set.imu_count);
+               set.time.ns, set.spread, set.imu_count);
         fflush(stdout);
     }
 }

@@ -9,7 +9,7 @@ static void print_frame(const versavis_item* item, const versavis_image* image, 
     char sigma[24] = "unknown";
     if (item->data.frame.sigma != VERSAVIS_SIGMA_UNKNOWN)
         snprintf(sigma, sizeof sigma, "%" PRIu32 " ns", item->data.frame.sigma);
-    printf("%" PRId64 " ns +- %s: %" PRIu32 " x %" PRIu32 " %s, first byte %u\n", item->time, sigma,
+    printf("%" PRId64 " ns +- %s: %" PRIu32 " x %" PRIu32 " %s, first byte %u\n", item->time.ns, sigma,
            image->width, image->height, versavis_pixel_format_name(image->pixel_format),
            (unsigned)first);
 }
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
     versavis_error error;
     versavis_stream* stream;
     versavis_item item = VERSAVIS_ITEM_INIT;
-    versavis_image image;
+    versavis_image image = VERSAVIS_IMAGE_INIT;
     if (versavis_open(NULL, argc > 1 ? argv[1] : "cam0", NULL, &stream, &error) != VERSAVIS_OK) {
         fprintf(stderr, "%s\n", error.message);
         return 1;

@@ -28,7 +28,7 @@ def view(name, path):
                     save(frame, path)
                     return
                 sigma = "unknown" if frame.sigma is None else f"{frame.sigma} ns"
-                print(f"{frame.time} ns +- {sigma}: {frame.read(np.mean):.1f}")
+                print(f"{frame.time} +- {sigma}: {frame.read(np.mean):.1f}")
             except (versavis.Pause, versavis.Overtaken) as pause:
                 print(pause)
 

@@ -112,12 +112,12 @@ class Recorder {
             ++recording.missed;
         else
             recording.items.push_back(
-                {serial, item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
+                {serial, item.data.trigger, to_host_ns(item.time.output()), item.data.sigma_ns});
     }
 
     void take(const ImuSample& item) {
         recordings_[imu_name_].items.push_back({SampleMark::serial_in(item.data.magnetic),
-                                                item.data.number, to_host_ns(item.time),
+                                                item.data.number, to_host_ns(item.time.output()),
                                                 item.data.sigma_ns});
     }
 

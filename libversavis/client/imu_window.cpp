@@ -61,71 +61,67 @@ Expected<void, NoItem> ImuWindow::collect() {
     return {};
 }
 
-bool ImuWindow::reaches(OutputTime time, std::uint32_t epoch) const {
-    if (samples_.empty()) return false;
-    const ImuSample& newest = samples_.back();
-    return newest.data.epoch > epoch || (newest.data.epoch == epoch && newest.time >= time);
+bool ImuWindow::reaches(const EpochTime& time) const {
+    return !samples_.empty() && samples_.back().time.life == time.life &&
+           !samples_.back().time.precedes(time);
 }
 
 /// What was forgotten is read from the ring again, where it still is.
-void ImuWindow::look_back(OutputTime after, std::uint32_t epoch) {
+void ImuWindow::look_back(const EpochTime& after) {
     const ImuSample* oldest = samples_.empty() ? nullptr : &samples_.front();
     if (before_) oldest = &*before_;
-    if (oldest == nullptr || oldest->data.epoch < epoch ||
-        (oldest->data.epoch == epoch && oldest->time <= after))
-        return;
-    const bool is_newest = samples_.empty() || samples_.back().data.epoch == epoch;
-    if (is_newest)
-        stream_.reader().seek(after, 1);  // and the one before, which shows that none is missing
-    else
-        stream_.reader().seek(ring::Position::oldest);  // times of several epochs are in no order
-    forget();
+    if (oldest == nullptr || !after.precedes(oldest->time)) return;
+    // And the one before, which shows that none is missing.
+    if (stream_.reader().seek(after, 1)) forget();
 }
 
-ImuSpan ImuWindow::take(OutputTime after, OutputTime upto, std::uint32_t epoch) {
-    const auto precedes = [&](const ImuSample& sample) {
-        return sample.data.epoch < epoch || (sample.data.epoch == epoch && sample.time <= after);
-    };
-    while (!samples_.empty() && precedes(samples_.front())) {
+ImuSpan ImuWindow::take(const EpochTime& after, const EpochTime& upto) {
+    ImuSpan span;
+    const bool other_life = !samples_.empty() && samples_.front().time.life != after.life;
+    if (!after.compares_with(upto) || other_life) {
+        span.gap = SpanGap::epoch;
+        return span;
+    }
+    while (!samples_.empty() && !after.precedes(samples_.front().time)) {
         before_ = std::move(samples_.front());
         samples_.pop_front();
     }
-    const bool begun = before_ && before_->data.epoch == epoch;
+    const bool begun = before_ && before_->time.compares_with(after);
     const ImuSample* last = begun ? &*before_ : nullptr;
-    ImuSpan span;
     bool counted = true;
     bool over = false;
     for (const ImuSample& sample : samples_) {
-        over = sample.data.epoch != epoch;
+        over = !sample.time.compares_with(upto);
         if (over) break;
         if (last != nullptr && sample.data.number > last->data.number)
             span.lost += sample.data.number - last->data.number - 1;
         else if (last != nullptr)
             counted = false;
         last = &sample;
-        if (sample.time > upto) {
+        if (upto.precedes(sample.time)) {
             span.beyond = sample;
             break;
         }
         span.samples.push_back(sample);
     }
     if (!begun)
-        span.gap = before_ && before_->data.epoch < epoch ? SpanGap::epoch : SpanGap::begin;
-    else if (last->time < upto)
+        span.gap = before_ && before_->time.epoch < after.epoch ? SpanGap::epoch : SpanGap::begin;
+    else if (last->time.precedes(upto))
         span.gap = over ? SpanGap::epoch : SpanGap::end;
     else
         span.gap = counted ? SpanGap::none : SpanGap::numbers;
     return span;
 }
 
-Expected<ImuSpan, NoItem> ImuWindow::between(OutputTime after, OutputTime upto, std::uint32_t epoch,
+Expected<ImuSpan, NoItem> ImuWindow::between(const EpochTime& after, const EpochTime& upto,
                                              Duration patience) {
-    look_back(after, epoch);
+    if (!after.compares_with(upto)) return take(after, upto);
+    look_back(after);
     const HostTime deadline = deadline_after(patience);
     for (;;) {
         if (auto collected = collect(); !collected) return Unexpected<NoItem>(collected.error());
         const Duration left = left_until(deadline);
-        if (reaches(upto, epoch) || left == Duration{}) return take(after, upto, epoch);
+        if (reaches(upto) || left == Duration{}) return take(after, upto);
         stream_.reader().wait(left);
     }
 }

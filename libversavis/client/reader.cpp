@@ -6,16 +6,21 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <numeric>
+#include <thread>
+#include <utility>
 
 #include "client/clock_ns.hpp"
 #include "client/deadline.hpp"
+#include "client/error_code.hpp"
 #include "client/futex.hpp"
 #include "client/process.hpp"
 #include "client/sealed.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
 #include "client/watch.hpp"
+#include "versavis/metadata.hpp"
 
 namespace versavis::ring {
 
@@ -45,7 +50,7 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
     auto file = open_trusted(path, options.owner);
     if (!file) return Unexpected(file.error());
     if (options.sealed_only && !is_sealed(file->file.get()))
-        return failure(path.string(), "is not sealed",
+        return failure(ErrorCode::not_trusted, path.string(), "is not sealed",
                        "set 'sealed = true' in [memory] of the service's configuration");
     auto mapping = Mapping::open(*file, path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
@@ -56,10 +61,28 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
         if (auto populated = mapping->populate(path); !populated)
             return Unexpected(populated.error());
     } else if (has_holes(file->file.get())) {
-        return failure(path.string(), "its service died and its memory was taken back",
+        return failure(ErrorCode::absent, path.string(),
+                       "its service died and its memory was taken back",
                        "wait for the service to start");
     }
     return std::make_shared<const Mapping>(std::move(*mapping));
+}
+
+// Between two looks for a stream that is not there yet. If lower, waiting for a service costs more;
+// if higher, the first items are missed.
+constexpr Duration open_period = milliseconds(20);
+
+std::uint32_t epoch_of(StreamKind kind, const Metadata& metadata) {
+    switch (kind) {
+        case StreamKind::frames: return unpack<FrameMetadata>(metadata).epoch;
+        case StreamKind::imu: return unpack<ImuMetadata>(metadata).epoch;
+        case StreamKind::events: return unpack<EventMetadata>(metadata).epoch;
+        default: return no_epoch;
+    }
+}
+
+bool has_epochs(StreamKind kind) {
+    return kind == StreamKind::frames || kind == StreamKind::imu || kind == StreamKind::events;
 }
 
 Unexpected<NoItem> pause(Pause why, std::uint64_t lost = 0) {
@@ -117,7 +140,12 @@ struct Reader::Contact {
 };
 
 Expected<Reader> Reader::open(const std::filesystem::path& path, const Options& options) {
+    const HostTime deadline = deadline_after(options.wait);
     auto mapping = map(path, options);
+    while (!mapping && mapping.error().code == ErrorCode::absent && !is_over(deadline)) {
+        std::this_thread::sleep_for(std::chrono::nanoseconds(open_period.ns));
+        mapping = map(path, options);
+    }
     if (!mapping) return Unexpected(mapping.error());
     Reader reader(path, options, std::move(*mapping));
     reader.seek(options.start);
@@ -183,7 +211,7 @@ Reader::Look Reader::read(std::uint64_t number, Item& item) const {
     const std::uint64_t generation = descriptor.slot_generation.load(std::memory_order_relaxed);
     const std::uint64_t length_and_slot =
         descriptor.length_and_slot.load(std::memory_order_relaxed);
-    item.time.ns = descriptor.output_time_ns.load(std::memory_order_relaxed);
+    const std::int64_t time_ns = descriptor.output_time_ns.load(std::memory_order_relaxed);
     std::transform(descriptor.metadata.begin(), descriptor.metadata.end(), item.metadata.begin(),
                    [](const auto& word) { return word.load(std::memory_order_relaxed); });
     // SYNC 3: acquire fence here, release fence in Writer::write_descriptor(): if any word above
@@ -193,12 +221,12 @@ Reader::Look Reader::read(std::uint64_t number, Item& item) const {
     if (ahead_of(number, descriptor.sequence.load(std::memory_order_relaxed)) != 0)
         return Look::overwritten;
 
+    const Constants& constants = mapping_->constants();
     item.number = number;
-    item.life = mapping_->constants().life;
+    item.time = {constants.life, time_ns, epoch_of(constants.kind, item.metadata)};
     const auto slot = static_cast<std::uint32_t>(length_and_slot);
     if (slot == no_slot) return Look::ready;
     const auto size = static_cast<std::uint32_t>(length_and_slot >> 32U);
-    const Constants& constants = mapping_->constants();
     if (slot >= constants.slot_count || size > constants.slot_size) return Look::overwritten;
     item.payload = Payload(mapping_, slot, generation, size);
     return item.payload.valid() ? Look::ready : Look::overwritten;
@@ -236,12 +264,14 @@ std::uint64_t Reader::place(Position position) const {
 
 void Reader::seek(Position position) { next_ = place(position); }
 
-void Reader::seek(OutputTime time, std::uint64_t earlier) {
+bool Reader::seek(const EpochTime& time, std::uint64_t earlier) {
+    if (time.life != life() || time.epoch == no_epoch || !has_epochs(kind())) return false;
     const std::uint64_t first = oldest();
     next_ = head();
     for (Item item; next_ > first; --next_)
-        if (read(next_ - 1, item) != Look::ready || item.time < time) break;
+        if (read(next_ - 1, item) != Look::ready || item.time.precedes(time)) break;
     next_ = std::max(std::min(first, next_), next_ - std::min(next_, earlier));
+    return true;
 }
 
 Received Reader::lapped() {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/sealed.hpp"
+#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -23,12 +24,12 @@ constexpr int seals = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_
 
 Unexpected<> not_handed(const std::filesystem::path& path) {
     if (errno == ECONNREFUSED)
-        return failure(path.string(), "no such stream: its service has ended",
+        return failure(ErrorCode::absent, path.string(), "no such stream: its service has ended",
                        "start it; 'versavis list' shows the streams");
     if (errno == EACCES)
-        return failure(path.string(), "permission denied",
+        return failure(ErrorCode::forbidden, path.string(), "permission denied",
                        "join the group that may read streams (usually 'versavis')");
-    return failure(path.string(),
+    return failure(code_of(errno), path.string(),
                    "was not handed over by the service: " +
                        std::error_code(errno, std::generic_category()).message(),
                    "is it still running? try again");
@@ -79,12 +80,13 @@ Expected<FileDescriptor> fetch_sealed(int socket, const std::filesystem::path& p
         0)
         return not_handed(path);
     if (!is_of(connection.get(), owner))
-        return failure(path.string(), "is served by another user than its owner",
+        return failure(ErrorCode::not_trusted, path.string(),
+                       "is served by another user than its owner",
                        "somebody else may have put it there: remove it");
     FileDescriptor file = receive(connection.get());
     if (!file) return not_handed(path);
     if (!is_sealed(file.get()))
-        return failure(path.string(), "is not sealed, though it should be",
+        return failure(ErrorCode::not_trusted, path.string(), "is not sealed, though it should be",
                        "install service and clients of the same release");
     return file;
 }

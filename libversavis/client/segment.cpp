@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/segment.hpp"
+#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -56,14 +57,15 @@ Expected<Mapping> Mapping::open_unchecked(int file, const std::filesystem::path&
                                           Access access) {
     struct stat status {};
     if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode))
-        return failure(path.string(), "is not a VersaVIS ring");
+        return failure(ErrorCode::damaged, path.string(), "is not a VersaVIS ring");
     try {
         const auto mode = access == Access::read_only ? ipc::read_only : ipc::read_write;
         Mapping mapping;
         mapping.region_ = ipc::mapped_region(OpenFile{file, mode}, mode);
         return mapping;
     } catch (const ipc::interprocess_exception& exception) {
-        return failure(path.string(), std::string("cannot be mapped: ") + exception.what(),
+        return failure(code_of(exception.get_native_error()), path.string(),
+                       std::string("cannot be mapped: ") + exception.what(),
                        "is the service running?");
     }
 }
@@ -73,7 +75,7 @@ Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access
     FileDescriptor file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     if (!file)
         return failure(
-            path.string(),
+            code_of(errno), path.string(),
             "cannot be opened: " + std::error_code(errno, std::generic_category()).message(),
             "is the service running?");
     struct stat status {};
@@ -89,16 +91,16 @@ Expected<Mapping> Mapping::open(const NamedFile& file, const std::filesystem::pa
     // rest of the header is complete. Without it a header could be checked and used half filled.
     if (mapping->size() < page_size ||
         mapping->header().magic.load(std::memory_order_acquire) != magic)
-        return failure(path.string(), "is not a VersaVIS ring");
+        return failure(ErrorCode::damaged, path.string(), "is not a VersaVIS ring");
     const Header& header = mapping->header();
     if (header.abi_major != abi_major)
-        return failure(path.string(),
+        return failure(ErrorCode::unsupported, path.string(),
                        "has layout version " + std::to_string(header.abi_major) +
                            ", this program reads version " + std::to_string(abi_major),
                        "install service and clients of the same release");
     mapping->read_constants();
     if (!well_formed(mapping->constants(), mapping->size()))
-        return failure(path.string(), "has a damaged header");
+        return failure(ErrorCode::damaged, path.string(), "has a damaged header");
     mapping->name_ = file.name;
     return mapping;
 }
@@ -108,7 +110,7 @@ Expected<> Mapping::populate(const std::filesystem::path& path) const {
     if (::madvise(bytes(), size(), how) == 0) return {};
     // Linux before 5.14 cannot. For any other reason, touching a page may end the process.
     if (errno != EINVAL)
-        return failure(path.string(),
+        return failure(ErrorCode::no_memory, path.string(),
                        "its memory cannot be mapped: " +
                            std::error_code(errno, std::generic_category()).message(),
                        "free memory: 'df /dev/shm' and 'free' show what there is");
@@ -122,7 +124,7 @@ Expected<Mapping> Mapping::remains() const {
     try {
         left.region_ = ipc::anonymous_shared_memory(2 * page_size);
     } catch (const ipc::interprocess_exception& exception) {
-        return failure(constants_.name.data(), exception.what());
+        return failure(ErrorCode::no_memory, constants_.name.data(), exception.what());
     }
     left.constants_ = constants_;
     left.constants_.descriptors_at = page_size;

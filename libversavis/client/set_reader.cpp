@@ -24,6 +24,10 @@ constexpr std::size_t most_pending = 128;
 // samples is overtaken.
 constexpr Duration unwatched = milliseconds(100);
 
+// Between two looks for a camera that is not there yet. If lower, waiting for it costs more; if
+// higher, its first frames are missed.
+constexpr Duration retry_period = milliseconds(100);
+
 // Losses of a camera that one look bears, as in ImuWindow.
 constexpr int most_losses = 16;
 
@@ -33,13 +37,6 @@ struct Pending {
     std::vector<std::optional<Frame>> frames;
     HostTime give_up;
 };
-
-/// Stamps may be anything.
-Duration spread_of(OutputTime earliest, OutputTime latest) {
-    std::int64_t ns = 0;
-    const bool too_large = __builtin_sub_overflow(latest.ns, earliest.ns, &ns);
-    return {too_large ? std::numeric_limits<std::int64_t>::max() : ns};
-}
 
 }  // namespace
 
@@ -54,7 +51,9 @@ bool FrameSet::valid() const {
 
 /// Not part of the interface, as its class is.
 struct [[gnu::visibility("hidden")]] SetReader::State {
-    std::vector<FrameStream> cameras;
+    std::vector<std::string> names;
+    std::vector<std::optional<FrameStream>> cameras;  ///< none: not there yet
+    HostTime retry;                                   ///< when those are looked for again
     std::optional<ImuWindow> imu;
     SetOptions options;
     WaitSet waiting;
@@ -63,12 +62,14 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::map<Key, Pending> pending;
     std::vector<std::optional<Key>> newest;  ///< of each camera
     std::optional<Key> finished;             ///< of the set before
-    std::optional<OutputTime> last;          ///< latest stamp of the set before, and its epoch
-    std::uint32_t last_epoch = 0;
-    std::uint64_t life{};
-    std::vector<bool> ended;  ///< of each camera: its stream is gone
+    std::optional<EpochTime> last;           ///< latest stamp of the set before
+    std::optional<std::uint64_t> life;       ///< none: no camera is there yet
+    std::vector<bool> ended;  ///< of each camera: its stream is gone, or was never there
     SetReport report;
 
+    void begin(std::uint64_t life_now);
+    Expected<> open(std::size_t camera);
+    std::optional<NoItem> open_absent();
     std::optional<NoItem> collect();
     std::optional<NoItem> collect(std::size_t camera);
     std::optional<NoItem> restarted(const NoItem& why, std::uint64_t life_now);
@@ -76,22 +77,29 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     bool any_ended() const;
     void add(std::size_t camera, Frame frame);
     bool decided(const Key& key, const Pending& set) const;
+    bool deliverable(const Pending& set) const;
+    void skip_older();
     std::optional<FrameSet> ready();
     FrameSet finish(const Key& key, Pending set);
-    ImuSpan samples_until(OutputTime latest, std::uint32_t epoch);
+    ImuSpan samples_until(const EpochTime& latest);
     std::optional<HostTime> next_deadline() const;
 };
 
 /// The pause to report: a restart once for all streams.
 std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64_t life_now) {
     if (why.why != Pause::restarted || life_now == life) return std::nullopt;
+    begin(life_now);
+    return why;
+}
+
+void SetReader::State::begin(std::uint64_t life_now) {
     life = life_now;
     pending.clear();
     newest.assign(cameras.size(), std::nullopt);
     finished.reset();
     last.reset();
-    ended.assign(cameras.size(), false);
-    return why;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
+        ended[camera] = !cameras[camera];
 }
 
 /// The pause to report: the end of the first camera that ends, until one of them continues.
@@ -107,8 +115,9 @@ bool SetReader::State::any_ended() const {
 }
 
 std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
+    if (!cameras[camera]) return std::nullopt;
     for (int losses = 0; losses < most_losses;) {
-        auto frame = cameras[camera].next();
+        auto frame = cameras[camera]->next();
         if (frame) {
             ended[camera] = false;
             add(camera, std::move(*frame));
@@ -116,14 +125,42 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
         }
         report.lost += frame.error().lost;
         if (frame.error().why == Pause::lost) ++losses;
-        if (auto pause = restarted(frame.error(), cameras[camera].reader().life())) return pause;
+        if (auto pause = restarted(frame.error(), cameras[camera]->reader().life())) return pause;
         if (auto pause = gone(frame.error(), camera)) return pause;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
     }
     return std::nullopt;
 }
 
+Expected<> SetReader::State::open(std::size_t camera) {
+    auto stream = FrameStream::open(names[camera], options);
+    if (!stream) return Unexpected(stream.error());
+    cameras[camera].emplace(std::move(*stream));
+    for (WaitSet* set : {&waiting, &cameras_waiting})
+        if (auto added = set->add(cameras[camera]->reader()); !added) return added;
+    ended[camera] = false;
+    if (!life) life = cameras[camera]->reader().life();
+    return {};
+}
+
+/// Those that do not exist yet. Whatever else keeps one from being opened may pass, too. One that
+/// appears in another life of the service is a restart that the others have not noticed yet.
+std::optional<NoItem> SetReader::State::open_absent() {
+    if (!is_over(retry)) return std::nullopt;
+    retry = HostTime{INT64_MAX};
+    std::optional<NoItem> pause;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        if (cameras[camera]) continue;
+        if (!open(camera))
+            retry = host_now() + retry_period;
+        else if (!pause)
+            pause = restarted({Pause::restarted}, cameras[camera]->reader().life());
+    }
+    return pause;
+}
+
 std::optional<NoItem> SetReader::State::collect() {
+    if (auto pause = open_absent()) return pause;
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
         if (auto pause = collect(camera)) return pause;
     if (!imu) return std::nullopt;
@@ -134,7 +171,7 @@ std::optional<NoItem> SetReader::State::collect() {
 void SetReader::State::add(std::size_t camera, Frame frame) {
     const bool suspect = (frame.data.flags & flag_suspect) != 0 && !options.suspect;
     // Of another life: a camera that lags behind a restart, or is ahead of the others.
-    if (frame.data.trigger == 0 || suspect || frame.life != life) {
+    if (frame.data.trigger == 0 || suspect || frame.time.life != life) {
         ++report.left_out;
         return;
     }
@@ -152,38 +189,42 @@ void SetReader::State::add(std::size_t camera, Frame frame) {
     set.frames[camera] = std::move(frame);
 }
 
-/// True when nothing more can come: each camera is there, or went past it, or time is over.
+/// True when nothing more can come: each camera is there, went past it, or ended; or time is over.
 bool SetReader::State::decided(const Key& key, const Pending& set) const {
-    return pending.size() > most_pending || is_over(set.give_up) ||
-           std::all_of(newest.begin(), newest.end(), [&](const auto& seen) { return seen >= key; });
+    if (pending.size() > most_pending || is_over(set.give_up)) return true;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
+        if (!ended[camera] && newest[camera] < key) return false;
+    return true;
+}
+
+bool SetReader::State::deliverable(const Pending& set) const {
+    return options.partial || std::all_of(set.frames.begin(), set.frames.end(),
+                                          [](const auto& frame) { return frame.has_value(); });
 }
 
 FrameSet SetReader::State::finish(const Key& key, Pending set) {
     FrameSet made;
-    made.life = life;
-    made.epoch = key.first;
     made.tick = key.second;
     made.frames = std::move(set.frames);
-    std::vector<OutputTime> times;
+    std::vector<EpochTime> times;
     for (const auto& frame : made.frames)
         if (frame) times.push_back(frame->time);
-    const auto [earliest, latest] = std::minmax_element(times.begin(), times.end());
+    const auto [earliest, latest] = std::minmax_element(
+        times.begin(), times.end(), [](const auto& a, const auto& b) { return a.precedes(b); });
     made.time = times.front();
-    made.spread = spread_of(*earliest, *latest);
+    made.spread = latest->since(*earliest).value_or(Duration{});
     finished = key;
-    if (imu) made.imu = samples_until(*latest, made.epoch);
+    if (imu) made.imu = samples_until(*latest);
     last = *latest;
-    last_epoch = made.epoch;
     ++report.sets;
     return made;
 }
 
-ImuSpan SetReader::State::samples_until(OutputTime latest, std::uint32_t epoch) {
-    constexpr OutputTime before_all{std::numeric_limits<std::int64_t>::min()};
-    ImuSpan span = imu->take(last && last_epoch == epoch ? *last
-                             : last                      ? before_all
-                                                         : latest,
-                             latest, epoch);
+ImuSpan SetReader::State::samples_until(const EpochTime& latest) {
+    EpochTime after = last.value_or(latest);
+    if (!after.compares_with(latest))
+        after = {latest.life, std::numeric_limits<std::int64_t>::min(), latest.epoch};
+    ImuSpan span = imu->take(after, latest);
     if (!last) span.gap = SpanGap::begin;  // no set before says from where on they count
     return span;
 }
@@ -194,16 +235,15 @@ std::optional<FrameSet> SetReader::State::ready() {
         const auto& frames = first->second.frames;
         if (!decided(first->first, first->second)) return std::nullopt;
         const bool whole = std::all_of(frames.begin(), frames.end(), [](auto& f) { return !!f; });
-        if (!whole && !options.partial) {
+        if (!deliverable(first->second)) {
             ++report.incomplete;
             finished = first->first;
             pending.erase(first);
             continue;
         }
-        OutputTime latest{INT64_MIN};
-        for (const auto& frame : frames)
-            if (frame) latest = std::max(latest, frame->time, std::less<>());
-        if (imu && !imu->reaches(latest, first->first.first) && !is_over(first->second.give_up))
+        const auto covered = [&](const auto& frame) { return !frame || imu->reaches(frame->time); };
+        if (imu && !is_over(first->second.give_up) &&
+            !std::all_of(frames.begin(), frames.end(), covered))
             return std::nullopt;
         if (!whole) ++report.incomplete;
         auto node = pending.extract(first);
@@ -212,40 +252,59 @@ std::optional<FrameSet> SetReader::State::ready() {
     return std::nullopt;
 }
 
+/// Forgets what comes before the newest set that can be delivered.
+void SetReader::State::skip_older() {
+    const auto newest_set = std::find_if(pending.rbegin(), pending.rend(), [&](const auto& set) {
+        return decided(set.first, set.second) && deliverable(set.second);
+    });
+    while (newest_set != pending.rend() && pending.begin()->first < newest_set->first) {
+        const auto first = pending.begin();
+        ++(deliverable(first->second) ? report.skipped : report.incomplete);
+        finished = first->first;
+        pending.erase(first);
+    }
+}
+
 std::optional<HostTime> SetReader::State::next_deadline() const {
     std::optional<HostTime> earliest;
     for (const auto& [key, set] : pending)
         earliest = std::min(set.give_up, earliest.value_or(set.give_up));
+    if (retry != HostTime{INT64_MAX}) earliest = std::min(retry, earliest.value_or(retry));
     return earliest;
 }
 
 Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
                                     const SetOptions& options) {
-    if (cameras.empty()) return failure("a set of frames", "needs the names of cameras");
+    if (cameras.empty())
+        return failure(ErrorCode::invalid, "a set of frames", "needs the names of cameras");
     if (std::set<std::string>(cameras.begin(), cameras.end()).size() != cameras.size())
-        return failure("a set of frames", "names a camera twice", "name each once");
+        return failure(ErrorCode::invalid, "a set of frames", "names a camera twice",
+                       "name each once");
     auto state = std::make_unique<State>();
     state->options = options;
-    for (const std::string& name : cameras) {
-        auto stream = FrameStream::open(name, options);
-        if (!stream) return Unexpected(stream.error());
-        state->cameras.push_back(std::move(*stream));
+    state->names = cameras;
+    state->cameras.resize(cameras.size());
+    state->newest.resize(cameras.size());
+    state->ended.resize(cameras.size(), true);
+    state->retry = HostTime{INT64_MAX};
+    const HostTime deadline = deadline_after(options.wait);
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        const auto opened = state->open(camera);
+        state->options.wait = left_until(deadline);
+        if (opened) continue;
+        if (!options.partial || opened.error().code != ErrorCode::absent)
+            return Unexpected(opened.error());
+        state->retry = host_now() + retry_period;
     }
     if (!options.imu.empty()) {
-        auto imu = ImuWindow::open(options.imu, options);
+        auto imu = ImuWindow::open(options.imu, state->options);
         if (!imu) return Unexpected(imu.error());
         state->imu.emplace(std::move(*imu));
     }
-    for (FrameStream& camera : state->cameras)
-        for (WaitSet* waiting : {&state->waiting, &state->cameras_waiting})
-            if (auto added = waiting->add(camera.reader()); !added)
-                return Unexpected(added.error());
+    state->options.wait = {};  // from here on, next() waits
     if (state->imu)
         if (auto added = state->waiting.add(state->imu->reader()); !added)
             return Unexpected(added.error());
-    state->newest.resize(cameras.size());
-    state->ended.resize(cameras.size());
-    state->life = state->cameras.front().reader().life();
     return SetReader(std::move(state));
 }
 
@@ -254,10 +313,15 @@ SetReader::SetReader(SetReader&&) noexcept = default;
 SetReader& SetReader::operator=(SetReader&&) noexcept = default;
 SetReader::~SetReader() = default;
 
-Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
+Expected<FrameSet, NoItem> SetReader::next(Duration timeout) { return take(timeout, false); }
+
+Expected<FrameSet, NoItem> SetReader::latest(Duration timeout) { return take(timeout, true); }
+
+Expected<FrameSet, NoItem> SetReader::take(Duration timeout, bool newest) {
     const HostTime deadline = deadline_after(timeout);
     for (bool is_last = false;;) {
         if (const auto pause = state_->collect()) return Unexpected<NoItem>(*pause);
+        if (newest) state_->skip_older();
         if (auto set = state_->ready()) return std::move(*set);
         const auto give_up = state_->next_deadline();
         state_->waiting.set_deadline(give_up);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/trust.hpp"
+#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <pwd.h>
@@ -59,11 +60,12 @@ bool maps_all_users() {
 Unexpected<> not_trusted(const std::filesystem::path& path, std::uint32_t user,
                          std::optional<std::uint32_t> owner) {
     if (user == unmapped_user && !maps_all_users())
-        return failure(path.string(), "belongs to a user that this container does not map",
+        return failure(ErrorCode::not_trusted, path.string(),
+                       "belongs to a user that this container does not map",
                        "map the service's user in it; or, if all users outside are trusted, set "
                        "VERSAVIS_OWNER=" +
                            std::to_string(unmapped_user));
-    return failure(path.string(),
+    return failure(ErrorCode::not_trusted, path.string(),
                    "belongs to user " + std::to_string(user) +
                        (owner ? ", not to user " + std::to_string(*owner)
                               : ", who is neither root, nor you, nor 'versavis'"),
@@ -73,14 +75,17 @@ Unexpected<> not_trusted(const std::filesystem::path& path, std::uint32_t user,
 
 Unexpected<> not_opened(const std::filesystem::path& path) {
     if (errno == EACCES)
-        return failure(path.string(), "permission denied",
+        return failure(ErrorCode::forbidden, path.string(), "permission denied",
                        "join the group that may read streams (usually 'versavis')");
-    if (errno == ELOOP) return failure(path.string(), "is a link, not a stream", "remove it");
+    if (errno == ELOOP)
+        return failure(ErrorCode::not_trusted, path.string(), "is a link, not a stream",
+                       "remove it");
     if (errno == ENOENT || errno == ENOTDIR)
-        return failure(path.string(), "no such stream",
+        return failure(ErrorCode::absent, path.string(), "no such stream",
                        "is the service running? 'versavis list' shows the streams");
-    return failure(path.string(), "cannot be opened: " +
-                                      std::error_code(errno, std::generic_category()).message());
+    return failure(
+        code_of(errno), path.string(),
+        "cannot be opened: " + std::error_code(errno, std::generic_category()).message());
 }
 
 }  // namespace
@@ -108,7 +113,8 @@ Expected<NamedFile> open_trusted(const std::filesystem::path& path,
     if (::fstat(file.get(), &of_file) != 0 || ::fstat(directory.get(), &of_directory) != 0)
         return not_opened(path);
     if (of_file.st_uid != of_directory.st_uid || (of_directory.st_mode & S_IWOTH) != 0)
-        return failure(path.string(), "does not belong to the owner of its directory",
+        return failure(ErrorCode::not_trusted, path.string(),
+                       "does not belong to the owner of its directory",
                        "somebody else may have put it there: remove it");
     if (!may_own(of_file.st_uid, owner)) return not_trusted(path, of_file.st_uid, owner);
     const FileId id{of_file.st_dev, of_file.st_ino};

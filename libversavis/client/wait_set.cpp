@@ -28,7 +28,8 @@ WaitSet::~WaitSet() = default;
 
 Expected<> WaitSet::add(ring::Reader& reader) {
     if (state_->readers.size() + 1 >= ring::most_futex_words)
-        return failure(reader.name(), "is one stream more than a WaitSet can hold",
+        return failure(ErrorCode::exhausted, reader.name(),
+                       "is one stream more than a WaitSet can hold",
                        "use a second WaitSet in another thread");
     state_->readers.push_back(&reader);
     return {};

@@ -36,13 +36,13 @@ bool has_successor(const std::filesystem::path& path, FileId known, FileId refus
 Expected<std::unique_ptr<Watch>> Watch::start() {
     FileDescriptor event(::eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK));
     if (!event)
-        return failure("a descriptor to wait on",
+        return failure(ErrorCode::exhausted, "a descriptor to wait on",
                        std::error_code(errno, std::generic_category()).message());
     auto watch = std::unique_ptr<Watch>(new Watch(std::move(event)));
     try {
         watch->thread_ = start_thread("watch", [self = watch.get()] { self->run(); });
     } catch (const std::system_error& error) {
-        return failure("a thread to wait in", error.what());
+        return failure(ErrorCode::exhausted, "a thread to wait in", error.what());
     }
     return watch;
 }

@@ -13,7 +13,10 @@
  * life: call again, and the stream goes on. What is negative needs somebody to act; versavis_error
  * has a sentence that says what to do.
  *
- * Times are nanoseconds. Docs of all fields: docs/contracts/shm-layout.md.
+ * Structures that may grow begin with their size: begin each with its VERSAVIS_..._INIT. A library
+ * fills in what both it and the program's header know. The others never change.
+ *
+ * Durations are nanoseconds. Docs of all fields: docs/contracts/shm-layout.md.
  */
 #ifndef VERSAVIS_H
 #define VERSAVIS_H
@@ -36,8 +39,16 @@ typedef enum versavis_result {
     VERSAVIS_GONE = 4,      /* the service has stopped or died; there is no new one yet */
     VERSAVIS_OVERTAKEN = 5, /* the writer needed the memory: what was read or copied is void */
     VERSAVIS_ERROR = -1,    /* see versavis_error */
-    VERSAVIS_INVALID = -2,  /* an argument is NULL, out of range, or of another kind of stream */
-    VERSAVIS_NO_MEMORY = -3
+    VERSAVIS_INVALID = -2,  /* an argument is NULL, out of range, without size, or of another kind */
+    VERSAVIS_NO_MEMORY = -3,   /* no memory left */
+    VERSAVIS_ABSENT = -4,      /* there is no such stream: not yet, or not any more */
+    VERSAVIS_FORBIDDEN = -5,   /* no permission */
+    VERSAVIS_NOT_TRUSTED = -6, /* the stream belongs to, or can be changed by, somebody else */
+    VERSAVIS_WRONG_KIND = -7,  /* a stream of another kind */
+    VERSAVIS_UNSUPPORTED = -8, /* a ring of a layout that this library does not know */
+    VERSAVIS_DAMAGED = -9,     /* no ring, or a damaged one */
+    VERSAVIS_EXHAUSTED = -10,  /* no descriptor or thread available */
+    VERSAVIS_OTHER_EPOCH = -11 /* times of two epochs, or of none, do not compare */
 } versavis_result;
 
 typedef enum versavis_kind {
@@ -72,12 +83,14 @@ enum { /* bits of flags */
 
 #define VERSAVIS_SIGMA_UNKNOWN 0xFFFFFFFFu
 #define VERSAVIS_ANY_OWNER (-1LL)
+#define VERSAVIS_NO_EPOCH 0xFFFFFFFFu
 
 #ifdef __cplusplus
-#define VERSAVIS_ZEROS \
-    {}
+#define VERSAVIS_ZEROS {}
+#define VERSAVIS_ZERO_UNION {}
 #else
 #define VERSAVIS_ZEROS {0}
+#define VERSAVIS_ZERO_UNION {{0}}
 #endif
 
 typedef struct versavis_stream versavis_stream;
@@ -88,15 +101,25 @@ typedef struct versavis_error {
     char message[512]; /* what is wrong, where, and what to do */
 } versavis_error;
 
-/* Zeros are good defaults, but for owner: use VERSAVIS_OPTIONS_INIT. */
+/* An instant of the output time, with what it belongs to. Times of two epochs do not compare: in
+ * between, a clock was set, or the service restarted. versavis_time_difference looks first. */
+typedef struct versavis_time {
+    uint64_t life; /* of the service */
+    int64_t ns;
+    uint32_t epoch; /* VERSAVIS_NO_EPOCH: of none, as that of a status document */
+    uint32_t reserved;
+} versavis_time;
+
 typedef struct versavis_options {
+    uint32_t size;
     uint32_t start;       /* versavis_position */
     uint32_t after_loss;  /* versavis_position */
-    int64_t owner;        /* user id that the streams must belong to; -1: root, you, 'versavis' */
     uint32_t sealed_only; /* 1: only streams that nobody can cut short */
-    uint32_t reserved;
+    int64_t owner;        /* user id that the streams must belong to; -1: root, you, 'versavis' */
+    int64_t wait;         /* how long opening waits for streams that are not there yet */
 } versavis_options;
-#define VERSAVIS_OPTIONS_INIT {0, 0, VERSAVIS_ANY_OWNER, 0, 0}
+#define VERSAVIS_OPTIONS_INIT \
+    {sizeof(versavis_options), 0, 0, 0, VERSAVIS_ANY_OWNER, 0}
 
 typedef struct versavis_frame {
     uint64_t trigger;
@@ -154,12 +177,13 @@ typedef struct versavis_event {
 /* An item in place. Begin with VERSAVIS_ITEM_INIT; end with versavis_release. Until then its memory
  * stays mapped, whatever becomes of stream and service. Do not copy it. */
 typedef struct versavis_item {
+    uint32_t size;
+    uint32_t kind;   /* versavis_kind: which of data holds */
     uint64_t number; /* since the stream was made */
-    uint64_t life;   /* of the service */
     uint64_t lost;   /* with VERSAVIS_LOST: how many */
-    int64_t time;    /* output time */
-    uint32_t stale;  /* 1: its writer was dead, or had closed the stream, when it was read */
-    uint32_t kind;   /* versavis_kind: which of the following holds */
+    versavis_time time;
+    uint32_t stale; /* 1: its writer was dead, or had closed the stream, when it was read */
+    uint32_t reserved;
     union {
         versavis_frame frame;
         versavis_imu imu;
@@ -170,28 +194,61 @@ typedef struct versavis_item {
     size_t payload_size;
     uint64_t held[6]; /* of the library */
 } versavis_item;
-#define VERSAVIS_ITEM_INIT VERSAVIS_ZEROS
+#define VERSAVIS_ITEM_INIT                                                               \
+    {sizeof(versavis_item), 0,    0, 0,             VERSAVIS_ZEROS, 0, 0,                \
+     VERSAVIS_ZERO_UNION,   NULL, 0, VERSAVIS_ZEROS}
 
 typedef struct versavis_image {
-    const uint8_t *data; /* row y begins at data + y * stride */
+    uint32_t size;
     uint32_t width;
     uint32_t height;
     uint32_t stride;
     uint32_t pixel_format;
     uint32_t channels;          /* 0: samples are packed across bytes */
     uint32_t bytes_per_channel; /* 1 or 2 */
+    uint32_t reserved;
+    const uint8_t *data; /* row y begins at data + y * stride */
 } versavis_image;
+#define VERSAVIS_IMAGE_INIT \
+    {sizeof(versavis_image), 0, 0, 0, 0, 0, 0, 0, NULL}
 
 /* How the sensor was when it took a frame, by the camera's own account; NaN: not known. */
 typedef struct versavis_sensor_state {
+    uint32_t size;
     float gain;        /* dB, or the unit of the camera */
     float temperature; /* degree Celsius */
 } versavis_sensor_state;
+#define VERSAVIS_SENSOR_STATE_INIT \
+    {sizeof(versavis_sensor_state), 0, 0}
 
 VERSAVIS_EXPORT const char *versavis_version(void);
 
 /* One sentence about a result. */
 VERSAVIS_EXPORT const char *versavis_result_text(int result);
+
+/* The span from earlier to later, negative where they are the other way round. Else
+ * VERSAVIS_OTHER_EPOCH. */
+VERSAVIS_EXPORT int versavis_time_difference(const versavis_time *later,
+                                             const versavis_time *earlier, int64_t *ns);
+
+/* ---- Which streams there are --------------------------------------------------------------- */
+
+typedef struct versavis_stream_info {
+    uint32_t size;
+    uint32_t kind; /* versavis_kind; 0: it cannot be opened */
+    const char *name;
+    uint64_t published; /* items since it was made */
+    uint64_t retained;  /* how many can be read at any one time, at most */
+    int32_t alive;      /* 1: its writer is */
+    int32_t error;      /* versavis_result: why it cannot be opened */
+    const char *why;    /* and in a sentence; else "" */
+} versavis_stream_info;
+
+/* Calls visit with each stream, by name, until it returns another value than 0, which is then
+ * returned. Infos are the library's, and last as long as the call. */
+VERSAVIS_EXPORT int versavis_list(const char *instance, const versavis_options *options,
+                                  int (*visit)(const versavis_stream_info *info, void *context),
+                                  void *context, versavis_error *error);
 
 /* ---- One stream -------------------------------------------------------------------------- */
 
@@ -214,8 +271,9 @@ VERSAVIS_EXPORT int versavis_latest(versavis_stream *stream, versavis_item *item
 /* position: a versavis_position. */
 VERSAVIS_EXPORT int versavis_seek(versavis_stream *stream, uint32_t position);
 
-/* To the oldest item from which on no output time is before time. */
-VERSAVIS_EXPORT int versavis_seek_time(versavis_stream *stream, int64_t time);
+/* To the oldest item from which on none is before time. VERSAVIS_OTHER_EPOCH: it is of another life
+ * or of no epoch, as are the items of a status stream; the stream stays where it is. */
+VERSAVIS_EXPORT int versavis_seek_time(versavis_stream *stream, const versavis_time *time);
 
 /* For poll and epoll, the stream's own: readable when versavis_next may find something, until it
  * returns VERSAVIS_NOTHING or VERSAVIS_GONE. Negative: an error. */
@@ -251,15 +309,16 @@ VERSAVIS_EXPORT void versavis_wait_set_free(versavis_wait_set *set);
 VERSAVIS_EXPORT int versavis_wait_set_add(versavis_wait_set *set, versavis_stream *stream,
                                           versavis_error *error);
 
-/* Sleeps until versavis_next of one of the streams has something to return. Returns its number, in
- * the order in which they were added; -1: nothing within timeout; less: an error. */
-VERSAVIS_EXPORT int versavis_wait_set_wait(versavis_wait_set *set, int64_t timeout);
+/* Sleeps until versavis_next of one of the streams has something to return: which one, in the order
+ * in which they were added. VERSAVIS_NOTHING: none within timeout. */
+VERSAVIS_EXPORT int versavis_wait_set_wait(versavis_wait_set *set, int64_t timeout,
+                                           uint32_t *which);
 
-/* Readable when versavis_wait_set_wait may find something, until it returns -1. */
+/* Readable when versavis_wait_set_wait may find something, until it returns VERSAVIS_NOTHING. */
 VERSAVIS_EXPORT int versavis_wait_set_fd(versavis_wait_set *set, versavis_error *error);
 
 typedef struct versavis_imu_sample {
-    int64_t time; /* output time */
+    versavis_time time;
     versavis_imu data;
 } versavis_imu_sample;
 
@@ -277,13 +336,15 @@ typedef enum versavis_span_gap {
 } versavis_span_gap;
 
 typedef struct versavis_imu_span {
+    uint32_t size;
+    uint32_t gap;                       /* a versavis_span_gap */
     const versavis_imu_sample *samples; /* until the next call or close */
     size_t count;
-    uint64_t lost;              /* samples missing within them */
-    uint32_t gap;               /* a versavis_span_gap */
-    int32_t has_beyond;         /* 1: beyond is there */
-    versavis_imu_sample beyond; /* the first one after the second instant, to interpolate */
+    uint64_t lost;                     /* samples missing within them */
+    const versavis_imu_sample *beyond; /* the first one after the second instant; NULL: none yet */
 } versavis_imu_span;
+#define VERSAVIS_IMU_SPAN_INIT \
+    {sizeof(versavis_imu_span), 0, NULL, 0, 0, NULL}
 
 /* Begins with what the ring still holds, whatever options say of the start. */
 VERSAVIS_EXPORT int versavis_imu_window_open(const char *instance, const char *stream,
@@ -291,41 +352,61 @@ VERSAVIS_EXPORT int versavis_imu_window_open(const char *instance, const char *s
                                              versavis_imu_window **opened, versavis_error *error);
 VERSAVIS_EXPORT void versavis_imu_window_close(versavis_imu_window *window);
 
-/* Samples of epoch, that of the instants, with after < time <= upto. Waits up to patience until one
- * of upto or later has come, or of a later epoch. Spans may follow each other or overlap.
- * VERSAVIS_RESTARTED, once: times before and after do not compare. */
-VERSAVIS_EXPORT int versavis_imu_window_span(versavis_imu_window *window, uint32_t epoch,
-                                             int64_t after, int64_t upto, int64_t patience,
-                                             versavis_imu_span *span);
+/* Samples with after < time <= upto. Waits up to patience until one of upto or later has come, or
+ * of a later epoch. Spans may follow each other or overlap. VERSAVIS_RESTARTED, once: times before
+ * and after do not compare. VERSAVIS_OTHER_EPOCH: after and upto do not. */
+VERSAVIS_EXPORT int versavis_imu_window_span(versavis_imu_window *window,
+                                             const versavis_time *after, const versavis_time *upto,
+                                             int64_t patience, versavis_imu_span *span);
+
+/* Readable when samples may have come, until versavis_imu_window_span has looked. */
+VERSAVIS_EXPORT int versavis_imu_window_fd(versavis_imu_window *window, versavis_error *error);
 
 /* ---- Sets of frames ---------------------------------------------------------------------- */
 
 enum { VERSAVIS_MOST_CAMERAS = 16 };
 
 typedef struct versavis_sets_options {
-    const char *imu;  /* name of its stream; NULL: none */
-    int64_t patience; /* from a set's first frame until it is given up; 0: 200 ms */
-    int32_t partial;  /* 1: sets that lack a frame are delivered, too */
-    int32_t suspect;  /* 1: frames whose pairing is not proved count, too */
-    versavis_options streams;
+    uint32_t size;
+    uint32_t partial; /* 1: sets that lack a frame, too; cameras may appear later */
+    uint32_t suspect; /* 1: frames whose pairing is not proved count, too */
+    uint32_t reserved;
+    const char *imu;                 /* name of its stream; NULL: none */
+    int64_t patience;                /* from a set's first frame until it is given up; 0: 200 ms */
+    const versavis_options *streams; /* NULL: the defaults */
 } versavis_sets_options;
-#define VERSAVIS_SETS_OPTIONS_INIT {NULL, 0, 0, 0, VERSAVIS_OPTIONS_INIT}
+#define VERSAVIS_SETS_OPTIONS_INIT \
+    {sizeof(versavis_sets_options), 0, 0, 0, NULL, 0, NULL}
 
+/* Begin with VERSAVIS_SET_INIT; end with versavis_set_release. Do not copy it. */
 typedef struct versavis_set {
-    uint64_t life;
+    uint32_t size;
+    uint32_t present; /* bit i: the frame of camera i is there, in the order of their names */
     uint64_t tick;
-    uint32_t epoch;
-    uint32_t present; /* bit i: frames[i] is there */
-    int64_t time;     /* of the first camera that is there */
-    int64_t spread;   /* latest less earliest stamp */
-    versavis_item frames[VERSAVIS_MOST_CAMERAS]; /* in the order in which cameras were named */
-    const versavis_imu_sample *imu; /* since the set before; until the next call or close */
+    versavis_time time;             /* of the first camera that is there */
+    int64_t spread;                 /* latest less earliest stamp */
+    const versavis_imu_sample *imu; /* since the set before; until the set is released */
     size_t imu_count;
-    uint64_t imu_lost;   /* samples missing within them */
-    int32_t imu_covered; /* 1: they reach from the set before to the latest stamp of this one */
-    uint32_t imu_gap;    /* a versavis_span_gap */
+    uint64_t imu_lost; /* samples missing within them */
+    uint32_t imu_gap;  /* a versavis_span_gap: why they do not reach from the set before to here */
+    uint32_t reserved;
+    void *held; /* of the library */
 } versavis_set;
-#define VERSAVIS_SET_INIT VERSAVIS_ZEROS
+#define VERSAVIS_SET_INIT \
+    {sizeof(versavis_set), 0, 0, VERSAVIS_ZEROS, 0, NULL, 0, 0, 0, 0, NULL}
+
+/* What became of frames that are in no set. */
+typedef struct versavis_set_report {
+    uint32_t size;
+    uint32_t reserved;
+    uint64_t sets;       /* delivered */
+    uint64_t incomplete; /* sets that lacked a frame, delivered or not */
+    uint64_t left_out;   /* frames without a tick, suspect, of another life, or of a set given up */
+    uint64_t lost;       /* frames overwritten before they were read */
+    uint64_t skipped;    /* sets that versavis_sets_latest passed over */
+} versavis_set_report;
+#define VERSAVIS_SET_REPORT_INIT \
+    {sizeof(versavis_set_report), 0, 0, 0, 0, 0, 0}
 
 VERSAVIS_EXPORT int versavis_sets_open(const char *instance, const char *const *cameras,
                                        size_t count, const versavis_sets_options *options,
@@ -334,16 +415,20 @@ VERSAVIS_EXPORT void versavis_sets_close(versavis_sets *sets);
 
 /* The next set, in the order of ticks. What the set held is released. */
 VERSAVIS_EXPORT int versavis_sets_next(versavis_sets *sets, versavis_set *set, int64_t timeout);
-/* What became of frames that are in no set. */
-typedef struct versavis_set_report {
-    uint64_t sets;       /* delivered */
-    uint64_t incomplete; /* sets that lacked a frame, delivered or not */
-    uint64_t left_out;   /* frames without a tick, suspect, of another life, or of a set given up */
-    uint64_t lost;       /* frames overwritten before they were read */
-} versavis_set_report;
-VERSAVIS_EXPORT int versavis_sets_report(const versavis_sets *sets, versavis_set_report *report);
 
+/* The newest set, passing over older ones; if there is none, the next. */
+VERSAVIS_EXPORT int versavis_sets_latest(versavis_sets *sets, versavis_set *set, int64_t timeout);
+
+VERSAVIS_EXPORT int versavis_sets_report(const versavis_sets *sets, versavis_set_report *report);
 VERSAVIS_EXPORT int versavis_sets_fd(versavis_sets *sets, versavis_error *error);
+
+/* The frame of one camera, to be released by itself. VERSAVIS_NOTHING: it is missing. */
+VERSAVIS_EXPORT int versavis_set_frame(const versavis_set *set, uint32_t camera,
+                                       versavis_item *item);
+
+/* 1 while the writer has touched no payload: what was read of them before is good. Else 0. */
+VERSAVIS_EXPORT int versavis_set_valid(const versavis_set *set);
+
 VERSAVIS_EXPORT void versavis_set_release(versavis_set *set);
 
 #ifdef __cplusplus

@@ -121,7 +121,7 @@ TEST_CASE("control: a camera stops and starts, and the file is read again") {
     const auto after_reload = new_set(*sets);
     REQUIRE(after_reload);
     CHECK(after_reload->tick > before_reload->tick);
-    CHECK(after_reload->epoch == before_reload->epoch);
+    CHECK(after_reload->time.epoch == before_reload->time.epoch);
     CHECK(sets->report().left_out == left_out);  // although the board counts its ticks anew
     tool_output(stack, {"start", "cam1"}, 0);
     delivering(stack, 1, 25);

@@ -63,7 +63,7 @@ client::LedReport evaluate(Stack& stack, double rate_hz, unsigned frames) {
     if (!found) throw std::runtime_error(found.error().message());
     each_frame(streams, frames,
                [&](const std::string& camera, const auto& item, const auto& pixels) {
-                   REQUIRE(evaluation.add(camera, 1, item.time, item.data, pixels));
+                   REQUIRE(evaluation.add(camera, 1, item.time.output(), item.data, pixels));
                });
     const auto report = evaluation.report();
     if (!report) throw std::runtime_error(report.error().message());

@@ -244,7 +244,7 @@ TEST_CASE("camera_pipeline: an exposure is translated once, when its record come
     for (const clock::Stamp& stamp : stamps) {
         const auto item = test::look(reader.next());
         REQUIRE(item.found == test::Found::item);
-        CHECK(item.time == stamp.output);
+        CHECK(item.time.output() == stamp.output);
         CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns >= stamp.sigma_ns);
         CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns < stamp.sigma_ns + 8'000);
     }

@@ -30,7 +30,7 @@ struct RecordedClock {
         if (item.found != test::Found::item) return std::nullopt;
         const auto read = from_metadata(unpack<ClockMetadata>(item.metadata));
         REQUIRE(read);
-        return Recorded{*read, item.time};
+        return Recorded{*read, item.time.output()};
     }
 
     template <class Item>

@@ -67,7 +67,7 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
                                  middle_stamp);
     const auto first = test::look(reader.next());
     const auto measured = unpack<FrameMetadata>(first.metadata);
-    CHECK(first.time == middle_stamp.output);
+    CHECK(first.time.output() == middle_stamp.output);
     CHECK(measured.board_time.ns == 99'002'000'000);
     CHECK(measured.host_time == middle_stamp.host);
     CHECK(measured.exposure == milliseconds(4));

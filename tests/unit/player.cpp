@@ -67,7 +67,7 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
             if (!item && item.error().why == ring::Pause::restarted) ++restarts;
             if (!item && item.error().why != ring::Pause::restarted) break;
             if (!item) continue;
-            ++lives[item->life];
+            ++lives[item->time.life];
             const auto frame = unpack<FrameMetadata>(item->metadata);
             const auto& pixels = expected.at(frame.block_id - 1);
             const SensorState sensor = unpack_sensor_state(item->payload.attributes());

@@ -347,7 +347,9 @@ TEST_CASE_METHOD(RecordedInstance,
 
 TEST_CASE_METHOD(RecordedInstance,
                  "recorder: the past of a stream with nothing new is older than wanted") {
-    events->publish(OutputTime{1}, pack(EventMetadata{}));
+    EventMetadata event{};
+    event.epoch = epoch;
+    events->publish(OutputTime{1}, pack(event));
     for (int i = 0; i < 200; ++i) publish();
     auto settings = this->settings();
     settings.before = milliseconds(300);
@@ -357,6 +359,21 @@ TEST_CASE_METHOD(RecordedInstance,
     });
     CHECK(report.streams.at("events").items == 0);
     CHECK(report.streams.at("imu0").items == 10);
+}
+
+TEST_CASE_METHOD(RecordedInstance,
+                 "recorder: of the past, what no time of another epoch says is recorded") {
+    const std::int64_t step_s = GENERATE(-3600, 3600);
+    for (int i = 0; i < 5; ++i) publish();
+    EventMetadata event{};
+    event.epoch = epoch + 1;
+    for (int i = 0; i < 3; ++i)
+        events->publish(OutputTime{(step_s + i) * 1'000'000'000}, pack(event));
+    auto settings = this->settings();
+    settings.before = milliseconds(200);
+    const RecordReport report = record(settings, [](int turn) { return turn < 2; });
+    CHECK(frames_in(settings.output).numbers == from_to(0, 5));
+    CHECK(report.streams.at("events").items == 1);  // of its own epoch, as far back as wanted
 }
 
 TEST_CASE_METHOD(RecordedInstance, "recorder: a gap before the first item stands where that does") {

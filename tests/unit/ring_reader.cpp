@@ -25,6 +25,7 @@
 #include "client/futex.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
+#include "versavis/metadata.hpp"
 #include "versavis/ring_reader.hpp"
 
 using namespace versavis;
@@ -155,7 +156,7 @@ TEST_CASE_METHOD(ReaderStreams, "ring_reader: where nothing is, the item says so
     CHECK(item.found == test::Found::nothing);
     CHECK(item.lost == 0);
     CHECK(item.number == 0);
-    CHECK(item.life == 0);
+    CHECK(item.time.life == 0);
     CHECK_FALSE(item.stale);
     CHECK(item.time.ns == 0);
     CHECK(item.payload.data() == nullptr);
@@ -208,7 +209,7 @@ TEST_CASE_METHOD(ReaderStreams,
             for (std::uint64_t i = 0; i < taken; ++i) REQUIRE(writer.acquire());
             const std::uint64_t there = std::min({published, slots, slots - taken});
             Reader reader = open("frames");
-            reader.seek(OutputTime{INT64_MIN});
+            CHECK(reader.seek(EpochTime{reader.life(), INT64_MIN, 0}));
             const auto item = test::look(reader.next());
             CHECK(item.found == (there == 0 ? test::Found::nothing : test::Found::item));
             CHECK(item.number == (there == 0 ? 0 : published - there));
@@ -229,10 +230,10 @@ TEST_CASE_METHOD(ReaderStreams, "ring_reader: a time is sought, and so many item
     for (const std::int64_t time : {100, 300, 200, 400, 500}) writer.publish(OutputTime{time}, {});
     Reader reader = open("events");
     const auto first_from = [&](std::int64_t time, std::uint64_t earlier) {
-        reader.seek(OutputTime{time}, earlier);
+        REQUIRE(reader.seek(EpochTime{reader.life(), time, 0}, earlier));
         return test::look(reader.next());
     };
-    reader.seek(OutputTime{400});
+    CHECK(reader.seek(EpochTime{reader.life(), 400, 0}));
     CHECK(test::look(reader.next()).number == 3);
     CHECK(first_from(250, 0).number == 3);  // an earlier one is not later than it
     CHECK(first_from(401, 0).number == 4);
@@ -243,6 +244,39 @@ TEST_CASE_METHOD(ReaderStreams, "ring_reader: a time is sought, and so many item
     CHECK(first_from(501, 0).found == test::Found::nothing);
     writer.publish(OutputTime{600}, {});
     CHECK(test::look(reader.next()).number == 5);
+}
+
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a time is sought in its epoch, and in its life") {
+    Writer writer = events();
+    const auto publish = [&](std::int64_t time_ns, std::uint32_t epoch) {
+        EventMetadata event{};
+        event.epoch = epoch;
+        writer.publish(OutputTime{time_ns}, pack(event));
+    };
+    for (const std::int64_t time : {900, 1000}) publish(time, 4);
+    for (const std::int64_t time : {300, 400}) publish(time, 5);  // the clock went back
+    Reader reader = open("events");
+    const auto first_from = [&](std::int64_t time, std::uint32_t epoch) {
+        REQUIRE(reader.seek(EpochTime{reader.life(), time, epoch}));
+        return test::look(reader.next());
+    };
+    CHECK(first_from(950, 4).number == 1);
+    CHECK(first_from(1001, 4).number == 2);  // all of a later epoch come after it
+    CHECK(first_from(0, 5).number == 2);
+    CHECK(first_from(350, 5).number == 3);
+    const auto last = first_from(400, 5);
+    CHECK(last.time.epoch == 5);
+    CHECK(last.time.life == reader.life());
+    CHECK(first_from(0, 3).number == 0);
+    CHECK_FALSE(reader.seek(EpochTime{reader.life() + 1, 0, 5}));
+    CHECK_FALSE(reader.seek(EpochTime{reader.life(), 0, no_epoch}));
+    CHECK(test::look(reader.next()).number == 1);  // it stayed where it was
+
+    Writer status = *Writer::create(directory.path(), {"status", StreamKind::status, 8});
+    status.publish(OutputTime{5}, {});
+    Reader documents = open("status", {Position::oldest});
+    CHECK_FALSE(documents.seek(EpochTime{documents.life(), 0, 5}));
+    CHECK(test::look(documents.next()).time.epoch == no_epoch);
 }
 
 TEST_CASE_METHOD(ReaderStreams, "ring_reader: an item that is lost alone is passed over alone") {
@@ -353,7 +387,7 @@ TEST_CASE_METHOD(ReaderStreams,
     const auto fresh = test::look(reader.next());
     CHECK_FALSE(fresh.stale);
     CHECK(life != 0);
-    CHECK(fresh.life == life);
+    CHECK(fresh.time.life == life);
     writer.reset();
     for (std::uint64_t i = 1; i < 3; ++i) {
         const auto stale = test::look(reader.next());

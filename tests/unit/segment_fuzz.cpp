@@ -96,7 +96,7 @@ std::uint64_t use(Reader& reader) {
         sum += item->valid() ? 1 : 0;
     }
     reader.seek(Position::oldest);
-    reader.seek(OutputTime{7});
+    sum += reader.seek(EpochTime{reader.life(), 7, 1}) ? 1 : 0;
     sum += reader.latest() ? 1 : 0;
     return sum + std::strlen(reader.name()) + reader.retained();
 }
@@ -110,7 +110,7 @@ void use_from_c(const std::string& instance) {
     versavis_item item = VERSAVIS_ITEM_INIT;
     for (int i = 0; i < 6; ++i) {
         versavis_next(stream, &item, 0);
-        versavis_image image{};
+        versavis_image image = VERSAVIS_IMAGE_INIT;
         if (versavis_view(&item, &image) != VERSAVIS_OK) continue;
         volatile std::uint8_t last = image.data[std::size_t{image.stride} * image.height - 1];
         static_cast<void>(last);

@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <thread>
@@ -93,8 +95,8 @@ TEST_CASE_METHOD(Rig, "set_reader: frames of one tick come together, in the orde
     CHECK(set->complete());
     CHECK(set->valid());
     CHECK(set->tick == 7);
-    CHECK(set->epoch == 1);
-    CHECK(set->life == set->frames[0]->life);
+    CHECK(set->time.epoch == 1);
+    CHECK(set->time.life == set->frames[0]->time.life);
     CHECK(set->spread == nanoseconds(300));
     CHECK(set->time.ns == time_of(7));
     CHECK(set->frames[1]->time.ns == time_of(7) + 300);
@@ -169,7 +171,7 @@ TEST_CASE_METHOD(Rig, "set_reader: a new epoch's ticks do not meet those before"
     const auto set = sets.next({});
     REQUIRE(set);
     CHECK(set->tick == 3);
-    CHECK(set->epoch == 2);
+    CHECK(set->time.epoch == 2);
     CHECK(sets.report().incomplete == 1);
 }
 
@@ -233,7 +235,7 @@ TEST_CASE_METHOD(Rig, "set_reader: where the clock steps, no set has samples of 
         }
         CHECK(set->imu.complete());
         REQUIRE(set->imu.samples.size() == 10);
-        CHECK(set->imu.samples.back().time == set->time);
+        CHECK(set->imu.samples.back().time.since(set->time) == Duration{});
     }
     CHECK(delivered == 24);
 }
@@ -321,7 +323,7 @@ TEST_CASE_METHOD(Rig,
     const auto set = sets.next({});
     REQUIRE(set);
     CHECK(set->tick == 2);
-    CHECK(set->life == next_life);
+    CHECK(set->time.life == next_life);
     CHECK(set->imu.samples.empty());
     frame(*b, 5, late);
     for (auto* camera : {a.get(), b.get()}) frame(*camera, 6, late);
@@ -486,7 +488,7 @@ TEST_CASE_METHOD(Rig, "set_reader: a damaged ring, or stamps that are anything, 
         StreamOptions where;
         where.instance = options().instance;
         auto window = ImuWindow::open("imu", where);
-        CHECK_FALSE(window->between({0}, {1}, 1, milliseconds(1))->covered());
+        CHECK_FALSE(window->between({1, 0, 1}, {1, 1, 1}, milliseconds(1))->covered());
     }
 }
 
@@ -519,4 +521,131 @@ TEST_CASE_METHOD(Rig, "set_reader: too many streams are refused") {
     names.emplace_back("a");
     CHECK_THAT(SetReader::open(names, options()).error().message(),
                Catch::Contains("a: is one stream more than a WaitSet can hold"));
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a camera that has ended is not waited for") {
+    SetOptions some = options();
+    some.partial = true;
+    SetReader sets = open(some);
+    b.reset();
+    CHECK(sets.next(seconds(20)).error().why == Pause::gone);
+    frame(*a, 3);
+    const auto set = sets.next({});  // without patience, which is a minute
+    REQUIRE(set);
+    CHECK(set->tick == 3);
+    CHECK_FALSE(set->complete());
+    b = camera("b");
+    frame(*a, 4);
+    frame(*b, 4);
+    CHECK(sets.next(seconds(20))->complete());
+    frame(*a, 5);
+    CHECK(sets.next({}).error().why == Pause::nothing);  // it is waited for again
+    frame(*b, 5);
+    CHECK(sets.next({})->complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: cameras that are not there yet are taken in") {
+    SetOptions some = options();
+    b.reset();
+    std::filesystem::remove(directory.path() / "b");
+    const auto refused = SetReader::open({"a", "b"}, some);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().code == ErrorCode::absent);
+    some.partial = true;
+    SetReader sets = open(some);
+    frame(*a, 1);
+    const auto alone = sets.next({});
+    REQUIRE(alone);
+    CHECK(alone->tick == 1);
+    CHECK_FALSE(alone->frames[1]);
+    b = camera("b");
+    frame(*b, 2);  // before it is found
+    CHECK(sets.next(milliseconds(300)).error().why == Pause::nothing);
+    frame(*b, 3);
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    frame(*a, 3);
+    const auto both = sets.next({});
+    REQUIRE(both);
+    CHECK(both->tick == 3);
+    CHECK(both->complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: it may be open before any camera is there") {
+    SetOptions some = options();
+    some.partial = true;
+    for (auto* writer : {&a, &b}) writer->reset();
+    for (const char* name : {"a", "b"}) std::filesystem::remove(directory.path() / name);
+    SetReader sets = open(some);
+    CHECK(sets.next(milliseconds(1)).error().why == Pause::gone);
+    CHECK(sets.fd().value_or(-1) >= 0);
+    a = camera("a", 4096, 77);
+    b = camera("b", 4096, 77);
+    CHECK(sets.next(milliseconds(300)).error().why == Pause::nothing);
+    frame(*a, 1);
+    frame(*b, 1);
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->complete());
+    CHECK(set->time.life == 77);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a camera that appears in another life is a restart") {
+    SetOptions some = options();
+    some.partial = true;
+    b.reset();
+    std::filesystem::remove(directory.path() / "b");
+    SetReader sets = open(some);
+    frame(*a, 1);
+    REQUIRE(sets.next({}));
+    b = camera("b", 4096, 78);
+    CHECK(sets.next(seconds(20)).error().why == Pause::restarted);
+    frame(*b, 4);
+    frame(*a, 4);  // of a camera that has not restarted yet
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    CHECK(sets.report().left_out == 1);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: opening waits for its cameras [threads]", "[threads]") {
+    b.reset();
+    std::filesystem::remove(directory.path() / "b");
+    SetOptions patient = options();
+    patient.wait = seconds(60);
+    std::thread service([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+        b = camera("b");
+    });
+    SetReader sets = open(patient);
+    service.join();
+    frame(*a, 1);
+    frame(*b, 1);
+    CHECK(sets.next({})->complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: the newest set comes with all samples since the one before") {
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    SetReader sets = open(with_imu);
+    const std::int64_t step = period_ns / 2;
+    const auto publish = [&](std::uint64_t tick) {
+        sample(time_of(tick));
+        frame(*a, tick);
+        frame(*b, tick);
+        sample(time_of(tick) + step);
+    };
+    publish(1);
+    REQUIRE(sets.next({}));
+    for (std::uint64_t tick = 2; tick <= 5; ++tick) publish(tick);
+    frame(*a, 6);  // it is not whole
+    const auto set = sets.latest({});
+    REQUIRE(set);
+    CHECK(set->tick == 5);
+    CHECK(set->imu.complete());
+    CHECK(set->imu.samples.size() == 8);
+    CHECK(sets.report().skipped == 3);
+    CHECK(sets.report().sets == 2);
+    CHECK(sets.latest({}).error().why == Pause::nothing);
+    frame(*b, 6);
+    sample(time_of(6));
+    CHECK(sets.latest({})->tick == 6);
+    CHECK(sets.report().skipped == 3);
 }

@@ -6,12 +6,14 @@ from ctypes import POINTER, c_char_p, c_float, c_int, c_int32, c_int64, c_size_t
 from ctypes import c_void_p
 from pathlib import Path
 
-NAME = "libversavis.so.0"
+NAME = "libversavis.so.1"
 
 OK, NOTHING, LOST, RESTARTED, GONE, OVERTAKEN = range(6)
-FRAMES, IMU, EVENTS, STATUS = range(1, 5)
+INVALID, NO_MEMORY, ABSENT, FORBIDDEN, NOT_TRUSTED, WRONG_KIND = range(-2, -8, -1)
+UNSUPPORTED, DAMAGED, EXHAUSTED, OTHER_EPOCH = range(-8, -12, -1)
+FRAMES, IMU, EVENTS, STATUS, EVIDENCE, CLOCK = range(1, 7)
 POSITIONS = {None: 0, "next": 1, "latest": 2, "middle": 3, "oldest": 4}
-SIGMA_UNKNOWN = 0xFFFFFFFF
+SIGMA_UNKNOWN = NO_EPOCH = 0xFFFFFFFF
 ANY_OWNER = -1
 MOST_CAMERAS = 16
 
@@ -23,9 +25,20 @@ class ErrorText(ctypes.Structure):
         return self.message.decode("utf-8", "replace")
 
 
-class Options(ctypes.Structure):
-    _fields_ = [("start", c_uint32), ("after_loss", c_uint32), ("owner", c_int64),
-                ("sealed_only", c_uint32), ("reserved", c_uint32)]
+class Sized(ctypes.Structure):
+    """What may grow begins with its size."""
+
+    def __init__(self, *values, **named):
+        super().__init__(ctypes.sizeof(self), *values, **named)
+
+
+class Time(ctypes.Structure):
+    _fields_ = [("life", c_uint64), ("ns", c_int64), ("epoch", c_uint32), ("reserved", c_uint32)]
+
+
+class Options(Sized):
+    _fields_ = [("size", c_uint32), ("start", c_uint32), ("after_loss", c_uint32),
+                ("sealed_only", c_uint32), ("owner", c_int64), ("wait", c_int64)]
 
 
 class FrameData(ctypes.Structure):
@@ -62,63 +75,72 @@ class ItemData(ctypes.Union):
                 ("words", c_uint64 * 12)]
 
 
-class Item(ctypes.Structure):
+class Item(Sized):
     _fields_ = [
-        ("number", c_uint64), ("life", c_uint64), ("lost", c_uint64), ("time", c_int64),
-        ("stale", c_uint32), ("kind", c_uint32), ("data", ItemData), ("payload", c_void_p),
-        ("payload_size", c_size_t), ("held", c_uint64 * 6),
+        ("size", c_uint32), ("kind", c_uint32), ("number", c_uint64), ("lost", c_uint64),
+        ("time", Time), ("stale", c_uint32), ("reserved", c_uint32), ("data", ItemData),
+        ("payload", c_void_p), ("payload_size", c_size_t), ("held", c_uint64 * 6),
     ]
 
 
-class Image(ctypes.Structure):
+class Image(Sized):
     _fields_ = [
-        ("data", c_void_p), ("width", c_uint32), ("height", c_uint32), ("stride", c_uint32),
+        ("size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("stride", c_uint32),
         ("pixel_format", c_uint32), ("channels", c_uint32), ("bytes_per_channel", c_uint32),
+        ("reserved", c_uint32), ("data", c_void_p),
     ]
 
 
-class SensorState(ctypes.Structure):
-    _fields_ = [("gain", c_float), ("temperature", c_float)]
+class SensorState(Sized):
+    _fields_ = [("size", c_uint32), ("gain", c_float), ("temperature", c_float)]
 
 
-class SetsOptions(ctypes.Structure):
-    _fields_ = [("imu", c_char_p), ("patience", c_int64), ("partial", c_int32),
-                ("suspect", c_int32), ("streams", Options)]
+class StreamInfo(ctypes.Structure):
+    _fields_ = [
+        ("size", c_uint32), ("kind", c_uint32), ("name", c_char_p), ("published", c_uint64),
+        ("retained", c_uint64), ("alive", c_int32), ("error", c_int32), ("why", c_char_p),
+    ]
+
+
+Visit = ctypes.CFUNCTYPE(c_int, POINTER(StreamInfo), c_void_p)
+
+
+class SetsOptions(Sized):
+    _fields_ = [("size", c_uint32), ("partial", c_uint32), ("suspect", c_uint32),
+                ("reserved", c_uint32), ("imu", c_char_p), ("patience", c_int64),
+                ("streams", POINTER(Options))]
 
 
 class ImuSample(ctypes.Structure):
-    _fields_ = [("time", c_int64), ("data", ImuData)]
+    _fields_ = [("time", Time), ("data", ImuData)]
 
 
-class ImuSample(ctypes.Structure):
-    _fields_ = [("time", c_int64), ("data", ImuData)]
-
-
-class ImuSpan(ctypes.Structure):
+class ImuSpan(Sized):
     _fields_ = [
-        ("samples", c_void_p), ("count", c_size_t), ("lost", c_uint64), ("gap", c_uint32),
-        ("has_beyond", c_int32), ("beyond", ImuSample),
+        ("size", c_uint32), ("gap", c_uint32), ("samples", c_void_p), ("count", c_size_t),
+        ("lost", c_uint64), ("beyond", c_void_p),
     ]
 
 
-class SetReport(ctypes.Structure):
+class SetReport(Sized):
     _fields_ = [
-        ("sets", c_uint64), ("incomplete", c_uint64), ("left_out", c_uint64), ("lost", c_uint64),
+        ("size", c_uint32), ("reserved", c_uint32), ("sets", c_uint64), ("incomplete", c_uint64),
+        ("left_out", c_uint64), ("lost", c_uint64), ("skipped", c_uint64),
     ]
 
 
-class Set(ctypes.Structure):
+class Set(Sized):
     _fields_ = [
-        ("life", c_uint64), ("tick", c_uint64), ("epoch", c_uint32), ("present", c_uint32),
-        ("time", c_int64), ("spread", c_int64), ("frames", Item * MOST_CAMERAS),
-        ("imu", c_void_p), ("imu_count", c_size_t), ("imu_lost", c_uint64),
-        ("imu_covered", c_int32), ("imu_gap", c_uint32),
+        ("size", c_uint32), ("present", c_uint32), ("tick", c_uint64), ("time", Time),
+        ("spread", c_int64), ("imu", c_void_p), ("imu_count", c_size_t), ("imu_lost", c_uint64),
+        ("imu_gap", c_uint32), ("reserved", c_uint32), ("held", c_void_p),
     ]
 
 
 SIGNATURES = {
     "version": (c_char_p, []),
     "result_text": (c_char_p, [c_int]),
+    "list": (c_int, [c_char_p, POINTER(Options), Visit, c_void_p, POINTER(ErrorText)]),
     "open": (c_int, [c_char_p, c_char_p, POINTER(Options), POINTER(c_void_p),
                      POINTER(ErrorText)]),
     "close": (None, [c_void_p]),
@@ -126,7 +148,7 @@ SIGNATURES = {
     "next": (c_int, [c_void_p, POINTER(Item), c_int64]),
     "latest": (c_int, [c_void_p, POINTER(Item), c_int64]),
     "seek": (c_int, [c_void_p, c_uint32]),
-    "seek_time": (c_int, [c_void_p, c_int64]),
+    "seek_time": (c_int, [c_void_p, POINTER(Time)]),
     "fd": (c_int, [c_void_p, POINTER(ErrorText)]),
     "valid": (c_int, [POINTER(Item)]),
     "copy": (c_int, [POINTER(Item), c_void_p, c_size_t]),
@@ -139,17 +161,22 @@ SIGNATURES = {
     "wait_set_new": (c_void_p, []),
     "wait_set_free": (None, [c_void_p]),
     "wait_set_add": (c_int, [c_void_p, c_void_p, POINTER(ErrorText)]),
-    "wait_set_wait": (c_int, [c_void_p, c_int64]),
+    "wait_set_wait": (c_int, [c_void_p, c_int64, POINTER(c_uint32)]),
     "imu_window_open": (c_int, [c_char_p, c_char_p, POINTER(Options), POINTER(c_void_p),
                                 POINTER(ErrorText)]),
     "imu_window_close": (None, [c_void_p]),
-    "imu_window_span": (c_int, [c_void_p, c_uint32, c_int64, c_int64, c_int64, POINTER(ImuSpan)]),
+    "imu_window_span": (c_int, [c_void_p, POINTER(Time), POINTER(Time), c_int64,
+                                POINTER(ImuSpan)]),
+    "imu_window_fd": (c_int, [c_void_p, POINTER(ErrorText)]),
     "sets_open": (c_int, [c_char_p, POINTER(c_char_p), c_size_t, POINTER(SetsOptions),
                           POINTER(c_void_p), POINTER(ErrorText)]),
     "sets_close": (None, [c_void_p]),
     "sets_next": (c_int, [c_void_p, POINTER(Set), c_int64]),
+    "sets_latest": (c_int, [c_void_p, POINTER(Set), c_int64]),
     "sets_report": (c_int, [c_void_p, POINTER(SetReport)]),
     "sets_fd": (c_int, [c_void_p, POINTER(ErrorText)]),
+    "set_frame": (c_int, [POINTER(Set), c_uint32, POINTER(Item)]),
+    "set_release": (None, [POINTER(Set)]),
 }
 
 

@@ -10,7 +10,8 @@ import weakref
 import numpy as np
 
 from . import _library as library
-from .errors import Error, Overtaken, Released, ViewEscaped
+from .errors import Overtaken, Released, ViewEscaped, error_of
+from .times import Time
 
 STAMP_KINDS = ("measured", "predicted", "trigger", "arrival")
 
@@ -49,8 +50,7 @@ class Item:
         self._held = held
 
     number = property(lambda self: self._item.number, doc="Since the stream was made, from 0.")
-    life = property(lambda self: self._item.life, doc="Of the service that published it.")
-    time = property(lambda self: self._item.time, doc="Output time in ns.")
+    time = property(lambda self: Time.of(self._item.time), doc="Output time, see Time.")
     words = property(lambda self: tuple(self._item.data.words), doc="The raw metadata.")
 
     @property
@@ -75,7 +75,7 @@ class Item:
         self.close()
 
     def __repr__(self):
-        return f"<versavis.{type(self).__name__} {self.number}, {self.time} ns>"
+        return f"<versavis.{type(self).__name__} {self.number}, {self.time}>"
 
     def _holding(self):
         held = self._held
@@ -91,7 +91,7 @@ class Item:
         if result == library.OVERTAKEN:
             raise overtaken(self)
         if result != library.OK:
-            raise Error(library.result_text(result))
+            raise error_of(result, library.result_text(result))
         return copied
 
 
@@ -146,7 +146,6 @@ class Frame(Item):
     height = number("frame", "height", "Rows.")
     stride = number("frame", "stride", "Bytes from a row to the next.")
     pixel_format = number("frame", "pixel_format", "PFNC code; `format` is its name.")
-    epoch = number("frame", "epoch", "Stamps of two epochs do not compare.")
     flags = flags_of("frame")
     delay = number("frame", "delay", "Of the lines, in ns, already taken off.")
 
@@ -254,7 +253,6 @@ class ImuSample(Item):
     temperature = unless_nan("imu", "temperature", "Degree Celsius; None: unknown.")
     pressure = unless_nan("imu", "pressure", "Pa; None: the part has none.")
     sigma = sigma_of("imu")
-    epoch = number("imu", "epoch", "Stamps of two epochs do not compare.")
     flags = flags_of("imu")
     filter_delay = number("imu", "filter_delay", "Of the part's filter, ns, already taken off.")
 
@@ -283,7 +281,6 @@ class Event(Item):
     board_time = unless_zero("event", "board_time", "In ns; None: not an event of the board.")
     host_time = number("event", "host_time", "CLOCK_MONOTONIC_RAW, ns.")
     sigma = sigma_of("event")
-    epoch = number("event", "epoch", "Stamps of two epochs do not compare.")
     expected = number("event", "expected", "Of what was doubted, what its witnesses say.")
     count = number("event", "count", "How many grid points; else 0.")
 

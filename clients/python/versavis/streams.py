@@ -8,11 +8,14 @@ import threading
 import time
 
 from . import _library as library
-from .errors import Error, Gone, Lost, Nothing, Released, Restarted
+from .errors import Error, Gone, Lost, Nothing, Overtaken, Released, Restarted, error_of
 from .items import Held, typed
 
 # Of one sleep in the library, in seconds: Python handles signals, such as Ctrl-C, in between.
 SLICE = 0.1
+
+# Between two looks for a stream that is not there yet, in seconds.
+OPEN_PERIOD = 0.02
 
 
 class Handle:
@@ -108,14 +111,15 @@ class Source:
         if result == library.RESTARTED:
             self.restarts += 1
         kinds = {library.NOTHING: Nothing, library.RESTARTED: Restarted, library.GONE: Gone}
-        return kinds.get(result, Error)(f"{self.name}: {library.result_text(result)}")
+        text = f"{self.name}: {library.result_text(result)}"
+        return kinds[result](text) if result in kinds else error_of(result, text)
 
     def _descriptor(self, function):
         error = library.ErrorText()
         with self._opened() as pointer:
             descriptor = function(pointer, error)
         if descriptor < 0:
-            raise Error(error.text())
+            raise error_of(descriptor, error.text())
         return descriptor
 
 
@@ -138,6 +142,7 @@ class Stream(Source):
     def __init__(self, handle, name):
         super().__init__(handle, name)
         self.kind = library.functions.stream_kind(handle.pointer)
+        self.overtaken = 0  # frames that read_each() passed over, so far
 
     def next(self, timeout=None):
         """The next item, waiting up to timeout seconds (None: without end; 0: not at all).
@@ -155,10 +160,26 @@ class Stream(Source):
         with self._opened() as pointer:
             library.functions.seek(pointer, place)
 
-    def seek_time(self, time_ns):
-        """To the oldest item from which on no output time is before time_ns."""
+    def seek_time(self, time):
+        """To the oldest item from which on none is before that Time.
+
+        Raises OtherEpoch, and stays where it is, if it is of another life of the service, or of no
+        epoch, as the items of a status stream are."""
         with self._opened() as pointer:
-            library.functions.seek_time(pointer, time_ns)
+            result = library.functions.seek_time(pointer, time.library())
+        if result != library.OK:
+            raise error_of(result, f"{self.name}: {time!r} does not compare with its items")
+
+    def read_each(self, function):
+        """Iterates over (frame, function(pixels)), as Frame.read() gives it, for each frame that
+        could be read in time. Others are counted in `overtaken`: this program was too slow."""
+        for frame in self:
+            try:
+                result = frame.read(function)
+            except Overtaken:
+                self.overtaken += 1
+                continue
+            yield frame, result
 
     def fileno(self):
         """For select, selectors and asyncio: readable when next(0) may find something, until it
@@ -207,11 +228,27 @@ def encoded(text):
 
 
 def stream_options(start, after_loss, owner, sealed_only):
-    return library.Options(position_number(start), position_number(after_loss),
-                           owner_number(owner), sealed_only)
+    return library.Options(position_number(start), position_number(after_loss), sealed_only,
+                           owner_number(owner), 0)
 
 
-def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_only=False):
+def opened(call, wait):
+    """Calls call(pointer, error) until it opens something, there is another error than that nothing
+    is there, or wait seconds are over (None: never). Returns the library's pointer."""
+    deadline = deadline_after(wait)
+    while True:
+        pointer, error = ctypes.c_void_p(), library.ErrorText()
+        result = call(pointer, error)
+        if result == library.OK:
+            return pointer
+        left = remaining(deadline)
+        if result != library.ABSENT or left <= 0:
+            raise error_of(result, error.text())
+        time.sleep(min(left, OPEN_PERIOD))
+
+
+def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_only=False,
+         wait=0):
     """Opens a stream, as "cam0", "imu0", "events" or "status".
 
     instance: of the service; None: that of $VERSAVIS_INSTANCE, or "default".
@@ -220,14 +257,49 @@ def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_
     owner: user, by name or number, to whom the streams must belong; None: whom $VERSAVIS_OWNER
     names, by name or number; without it root, oneself, or "versavis".
     sealed_only: only of a service that seals its streams: nobody can cut them short.
+    wait: seconds to wait for a stream that is not there yet; None: without end.
 
-    Raises Error with what to do."""
+    Raises Absent, Forbidden, NotTrusted or another Error, with what to do."""
     options = stream_options(start, after_loss, owner, sealed_only)
-    pointer, error = ctypes.c_void_p(), library.ErrorText()
-    result = library.functions.open(encoded(instance), encoded(name), options, pointer, error)
-    if result != library.OK:
-        raise Error(error.text())
+    pointer = opened(lambda pointer, error: library.functions.open(
+        encoded(instance), encoded(name), options, pointer, error), wait)
     return Stream(Handle(pointer, library.functions.close), name)
+
+
+class StreamInfo:
+    """One stream of an instance: its name; kind, as "frames"; how many items it has published; how
+    many are retained at most; whether its writer is alive. error: why it cannot be opened; then
+    only its name is known."""
+
+    def __init__(self, info):
+        self.name = os.fsdecode(info.name)
+        self.kind = KIND_NAMES.get(info.kind)
+        self.published, self.retained = info.published, info.retained
+        self.alive = bool(info.alive)
+        self.error = error_of(info.error, info.why.decode("utf-8", "replace")) if info.error else None
+
+    def __repr__(self):
+        return f"<versavis.StreamInfo {self.name}, {self.error or self.kind}>"
+
+
+KIND_NAMES = {library.FRAMES: "frames", library.IMU: "imu", library.EVENTS: "events",
+              library.STATUS: "status", library.EVIDENCE: "evidence", library.CLOCK: "clock"}
+
+
+def list_streams(instance=None, owner=None):
+    """A StreamInfo of each stream of an instance, by name. Raises Absent: there is none."""
+    found = []
+
+    def visit(info, _):
+        found.append(StreamInfo(info.contents))
+        return 0
+
+    error = library.ErrorText()
+    options = stream_options("next", None, owner, False)
+    result = library.functions.list(encoded(instance), options, library.Visit(visit), None, error)
+    if result != library.OK:
+        raise error_of(result, error.text())
+    return found
 
 
 def wait(streams, timeout=None):
@@ -260,18 +332,20 @@ def wait_once(streams, seconds):
         stack.callback(library.functions.wait_set_free, waiting)
         for i in range(len(streams)):
             error = library.ErrorText()
-            if library.functions.wait_set_add(waiting, pointers[i], error) != library.OK:
-                raise Error(error.text())
+            result = library.functions.wait_set_add(waiting, pointers[i], error)
+            if result != library.OK:
+                raise error_of(result, error.text())
         return all_ready(waiting, nanoseconds(seconds))
 
 
 def all_ready(waiting, nanoseconds_left):
     """Streams take turns: when one comes again, all that have something were named."""
     found = set()
-    which = library.functions.wait_set_wait(waiting, nanoseconds_left)
-    while which >= 0 and which not in found:
-        found.add(which)
-        which = library.functions.wait_set_wait(waiting, 0)
-    if which < -1:
-        raise Error(library.result_text(which))
+    which = ctypes.c_uint32()
+    result = library.functions.wait_set_wait(waiting, nanoseconds_left, which)
+    while result == library.OK and which.value not in found:
+        found.add(which.value)
+        result = library.functions.wait_set_wait(waiting, 0, which)
+    if result < 0:
+        raise error_of(result, library.result_text(result))
     return found

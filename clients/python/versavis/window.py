@@ -5,17 +5,18 @@ import ctypes
 import numpy as np
 
 from . import _library as library
-from .errors import Error
-from .streams import SLICE, Handle, Source, deadline_after, encoded, nanoseconds, remaining
-from .streams import stream_options
+from .streams import (SLICE, Handle, Source, deadline_after, encoded, nanoseconds, opened,
+                      remaining, stream_options)
 
 # As versavis_imu_sample lies in memory.
 imu_dtype = np.dtype([
-    ("time", "<i8"), ("board_time", "<i8"), ("host_time", "<i8"), ("number", "<u8"),
+    ("life", "<u8"), ("time", "<i8"), ("time_epoch", "<u4"), ("time_reserved", "<u4"),
+    ("board_time", "<i8"), ("host_time", "<i8"), ("number", "<u8"),
     ("gyro", "<f4", 3), ("accel", "<f4", 3), ("magnetic", "<f4", 3), ("temperature", "<f4"),
     ("pressure", "<f4"), ("sigma", "<u4"), ("epoch", "<u4"), ("flags", "<u4"),
     ("filter_delay", "<i8"), ("accel_age", "<i4"), ("reserved", "<u4"),
 ])
+assert imu_dtype.itemsize == ctypes.sizeof(library.ImuSample)
 
 
 def samples_at(address, count):
@@ -42,8 +43,7 @@ class ImuSpan:
     def __init__(self, span):
         self.samples = samples_at(span.samples, span.count)
         self.lost, self.gap = span.lost, GAPS[span.gap]
-        beyond = samples_at(ctypes.addressof(span.beyond), 1)
-        self.beyond = beyond[0] if span.has_beyond else None
+        self.beyond = samples_at(span.beyond, 1)[0] if span.beyond else None
 
     @property
     def covered(self):
@@ -57,12 +57,12 @@ class ImuSpan:
 class ImuWindow(Source):
     """Samples between any two instants, as far as the ring holds them."""
 
-    def between(self, after, upto, epoch, patience=None):
-        """An ImuSpan of the samples with after < time <= upto (output time, ns) of epoch, that of
-        the frames whose times these are. Waits for a sample of upto or later, or of a later epoch,
-        for patience seconds (None: without end).
+    def between(self, after, upto, patience=None):
+        """An ImuSpan of the samples with after < time <= upto, two Times, as of frames. Waits for a
+        sample of upto or later, or of a later epoch, for patience seconds (None: without end).
 
-        Raises Restarted, once: times before and after do not compare."""
+        Raises Restarted, once: times before and after do not compare. Raises OtherEpoch: after and
+        upto do not."""
         if upto < after:
             raise ValueError("between() needs the earlier instant first")
         span = library.ImuSpan()
@@ -70,7 +70,7 @@ class ImuWindow(Source):
         while True:
             left = remaining(deadline)
             with self._opened() as pointer:
-                result = library.functions.imu_window_span(pointer, epoch, after, upto,
+                result = library.functions.imu_window_span(pointer, after.library(), upto.library(),
                                                            nanoseconds(left), span)
                 made = ImuSpan(span) if result == library.OK else None
             if made is None:
@@ -80,14 +80,17 @@ class ImuWindow(Source):
                 return made
 
 
-def imu_window(name, instance=None, owner=None, sealed_only=False):
+    def fileno(self):
+        """For select, selectors and asyncio: readable when samples may have come, until between()
+        has looked. It belongs to the window."""
+        return self._descriptor(library.functions.imu_window_fd)
+
+
+def imu_window(name, instance=None, owner=None, sealed_only=False, wait=0):
     """Opens the samples of an IMU, those that the ring still holds included.
 
     The arguments are as for open(). Raises Error with what to do."""
     options = stream_options("oldest", None, owner, sealed_only)
-    pointer, error = ctypes.c_void_p(), library.ErrorText()
-    result = library.functions.imu_window_open(encoded(instance), encoded(name), options, pointer,
-                                               error)
-    if result != library.OK:
-        raise Error(error.text())
+    pointer = opened(lambda pointer, error: library.functions.imu_window_open(
+        encoded(instance), encoded(name), options, pointer, error), wait)
     return ImuWindow(Handle(pointer, library.functions.imu_window_close), name)

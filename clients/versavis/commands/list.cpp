@@ -3,13 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "recording/kind_name.hpp"
-#include "versavis/ring_path.hpp"
-#include "versavis/ring_reader.hpp"
+#include "versavis/stream.hpp"
 
 namespace versavis::client {
 
@@ -23,34 +20,26 @@ std::string as_text(const nlohmann::json& document) {
 }  // namespace
 
 Expected<std::string> list_streams(const std::string& instance, bool as_json) {
-    const auto directory = instance_directory(instance);
-    std::error_code error;
-    std::vector<std::filesystem::path> paths;
-    for (const auto& entry : std::filesystem::directory_iterator(directory, error))
-        if (entry.path().filename().string().front() != '.') paths.push_back(entry.path());
-    if (error)
-        return failure(directory.string(), error.message(),
-                       "is versavisd running? --instance selects another instance");
-    std::sort(paths.begin(), paths.end());
+    StreamOptions options;
+    options.instance = instance;
+    const auto streams = versavis::list_streams(options);
+    if (!streams) return Unexpected(streams.error());
     nlohmann::json document = nlohmann::json::array();
     std::string text;
-    for (const auto& path : paths) {
-        auto reader = ring::Reader::open(path);
-        if (!reader) {  // it may just have ended, or not be one: the others are listed all the same
-            document.push_back(
-                {{"name", path.filename().string()}, {"error", reader.error().message()}});
-            text += fmt::format("{:<12} {}\n", path.filename().string(), reader.error().message());
+    for (const StreamInfo& stream : *streams) {
+        if (stream.error) {  // it may just have ended, or not be one
+            document.push_back({{"name", stream.name}, {"error", stream.error->message()}});
+            text += fmt::format("{:<12} {}\n", stream.name, stream.error->message());
             continue;
         }
-        const bool alive = reader->writer_alive();
-        document.push_back({{"name", reader->name()},
-                            {"kind", kind_name(reader->kind())},
-                            {"items", reader->head()},
-                            {"retained", reader->retained()},
-                            {"alive", alive}});
-        text += fmt::format("{:<12} {:<7} {:>10} items, {:>6} retained{}\n", reader->name(),
-                            kind_name(reader->kind()), reader->head(), reader->retained(),
-                            alive ? "" : ", writer gone");
+        document.push_back({{"name", stream.name},
+                            {"kind", kind_name(stream.kind)},
+                            {"items", stream.published},
+                            {"retained", stream.retained},
+                            {"alive", stream.alive}});
+        text += fmt::format("{:<12} {:<7} {:>10} items, {:>6} retained{}\n", stream.name,
+                            kind_name(stream.kind), stream.published, stream.retained,
+                            stream.alive ? "" : ", writer gone");
     }
     return as_json ? as_text(document) + "\n" : text;
 }

@@ -40,13 +40,6 @@ constexpr Duration patience = milliseconds(200);
 
 double ms(Duration d) { return static_cast<double>(d.ns) * 1e-6; }
 
-/// What stamps continue each other.
-struct Span {
-    std::uint64_t life = 0;
-    std::uint32_t epoch = 0;
-    bool operator==(const Span& other) const { return life == other.life && epoch == other.epoch; }
-};
-
 /// Time of day of an instant that is so long ago.
 std::string time_of_day(Duration ago) {
     const std::time_t then = std::time(nullptr) - ago.ns / seconds(1).ns;
@@ -77,14 +70,14 @@ class LiveCamera {
     std::optional<StretchComparison> take() { return comparison_.take(); }
 
     /// Errors: the camera's calibration is not for these frames.
-    Expected<> add(const Frame& frame, const Span& gyro_span) {
-        latest_ = frame.time;
+    Expected<> add(const Frame& frame, const EpochTime& gyro_time) {
+        latest_ = frame.time.output();
         const bool suspect = (frame.data.flags & flag_suspect) != 0;
-        if (suspect || !(Span{frame.life, frame.data.epoch} == gyro_span)) {
+        if (suspect || !frame.time.compares_with(gyro_time)) {
             tracker_.reset();
             return {};
         }
-        if (tracker_ && frame.time - followed_ < least_interval) return {};
+        if (tracker_ && frame.time.since(followed_) < least_interval) return {};
         const auto view = frame.image();
         if (!view) return {};  // it has fewer pixels than it should
         if (view->layout.channels == 0)
@@ -98,7 +91,7 @@ class LiveCamera {
         if (!tracker_)
             if (auto begun = begin(*view, factor); !begun) return begun;
         followed_ = frame.time;
-        auto rotation = tracker_->add(std::move(image), frame.time);
+        auto rotation = tracker_->add(std::move(image), latest_);
         if (!rotation) {  // the size changed
             tracker_.reset();
             return {};
@@ -137,7 +130,7 @@ class LiveCamera {
     std::optional<FeatureRotation> tracker_;
     std::optional<OffsetWatch> watch_;
     PictureComparison comparison_{live_stretch};
-    OutputTime followed_;  ///< the last frame that was compared
+    EpochTime followed_;  ///< the last frame that was compared
     OutputTime latest_;
     bool departed_ = false;
 };
@@ -228,7 +221,7 @@ class LiveVerification {
             for (; frame || frame.error().why != Pause::nothing; frame = camera->stream().next()) {
                 if (!frame && frame.error().why == Pause::gone) break;
                 if (!frame) continue;
-                if (auto added = camera->add(*frame, gyro_span_); !added) return added;
+                if (auto added = camera->add(*frame, gyro_time_); !added) return added;
             }
             while (const auto stretch = camera->take()) report(*camera, *stretch);
         }
@@ -241,17 +234,15 @@ class LiveVerification {
              sample = imu_->next()) {
             if (!sample && sample.error().why == Pause::gone) return;
             if (!sample) continue;
-            const Span span{sample->life, sample->data.epoch};
-            const bool continues = span == gyro_span_ && sample->time > gyro_time_;
-            if (!continues && span == gyro_span_) continue;
-            if (!continues)
+            const auto since = sample->time.since(gyro_time_);
+            if (since && *since <= Duration{}) continue;
+            if (!since)
                 for (const auto& camera : cameras_) camera->restart();
-            gyro_span_ = span;
             gyro_time_ = sample->time;
             if ((sample->data.flags & (flag_sensor_error | flag_repeated)) != 0) continue;
             const auto& gyro = sample->data.gyro;
             for (const auto& camera : cameras_)
-                camera->add(GyroSample{sample->time, {gyro[0], gyro[1], gyro[2]}});
+                camera->add(GyroSample{gyro_time_.output(), {gyro[0], gyro[1], gyro[2]}});
         }
     }
 
@@ -343,8 +334,7 @@ class LiveVerification {
     std::optional<ImuStream> imu_;
     std::string imu_name_;
     std::vector<std::unique_ptr<LiveCamera>> cameras_;
-    Span gyro_span_;
-    OutputTime gyro_time_;
+    EpochTime gyro_time_;
     ProgressLine progress_;
     bool waiting_ = false;
 };

@@ -29,8 +29,8 @@ std::span<const std::byte> as_bytes(const std::string& text) {
 
 ItemMessage message_of(ring::StreamKind kind, const ring::Item& item, const std::string& payload) {
     return {item.number,
-            item.life,
-            item.time,
+            item.time.life,
+            item.time.output(),
             static_cast<std::uint32_t>(item.payload.size()),
             kind,
             item.metadata,
@@ -82,7 +82,7 @@ Expected<ItemWriter::Outcome> ItemWriter::write_frame(const std::string& stream,
     const std::uint16_t id =
         channel(channels, stream, ros_topic(stream, "/image_raw"), "sensor_msgs/msg/Image");
     auto written = file_.write({id, channels.sequence, item.time.ns},
-                               ros_image_head(item.time, stream, frame, length), pixels);
+                               ros_image_head(item.time.output(), stream, frame, length), pixels);
     if (!written) return Unexpected(written.error());
     if (!item.valid()) {
         file_.take_back();
@@ -104,7 +104,8 @@ Expected<> ItemWriter::write_png(const std::string& stream, const ring::Item& it
                                      "sensor_msgs/msg/CompressedImage");
     auto written = file_.write(
         {id, channels.sequence, item.time.ns},
-        ros_png_head(item.time, stream, frame, static_cast<std::uint32_t>(png.size())), png);
+        ros_png_head(item.time.output(), stream, frame, static_cast<std::uint32_t>(png.size())),
+        png);
     if (!written) return written;
     const std::string attributes = mcap_number(item.payload.attributes());
     const ItemMessage message = message_of(ring::StreamKind::frames, item, attributes);
@@ -130,7 +131,8 @@ void ItemWriter::write_frame_notes(Channels& channels, const std::string& stream
     file_.write(
         {channel(channels, stream, ros_topic(stream, "/camera_info"), "sensor_msgs/msg/CameraInfo"),
          channels.sequence, item.time.ns},
-        ros_camera_info(item.time, stream, frame, lens == lenses_.end() ? nullptr : &lens->second));
+        ros_camera_info(item.time, stream, frame,
+                        lens == lenses_.end() ? nullptr : &lens->second));
 }
 
 void ItemWriter::write_imu(Channels& channels, const std::string& stream, const ring::Item& item) {
@@ -140,12 +142,14 @@ void ItemWriter::write_imu(Channels& channels, const std::string& stream, const 
                      item.time.ns},
                     message);
     };
-    add("/data_raw", "sensor_msgs/msg/Imu", ros_imu(item.time, stream, sample));
+    add("/data_raw", "sensor_msgs/msg/Imu", ros_imu(item.time.output(), stream, sample));
     if (!std::isnan(sample.magnetic[0]))
-        add("/mag", "sensor_msgs/msg/MagneticField", ros_magnetic_field(item.time, stream, sample));
+        add("/mag", "sensor_msgs/msg/MagneticField",
+            ros_magnetic_field(item.time.output(), stream, sample));
     if (std::isnan(sample.temperature) || sample.temperature == channels.temperature) return;
     channels.temperature = sample.temperature;
-    add("/temperature", "sensor_msgs/msg/Temperature", ros_temperature(item.time, stream, sample));
+    add("/temperature", "sensor_msgs/msg/Temperature",
+        ros_temperature(item.time.output(), stream, sample));
 }
 
 void ItemWriter::write_event(Channels& channels, const std::string& stream,

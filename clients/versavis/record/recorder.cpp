@@ -52,12 +52,17 @@ constexpr std::size_t frames_per_processor = 4;
 
 constexpr std::uint32_t slipped = static_cast<std::uint32_t>(EventKind::pairing_slipped);
 
-std::uint32_t epoch_of(ring::StreamKind kind, const ring::Metadata& metadata) {
-    switch (kind) {
-        case ring::StreamKind::frames: return unpack<FrameMetadata>(metadata).epoch;
-        case ring::StreamKind::imu: return unpack<ImuMetadata>(metadata).epoch;
-        default: return 0;
-    }
+/// Where a new epoch is a gap; events of two epochs may come in any order.
+std::uint32_t epoch_of(ring::StreamKind kind, const ring::Item& item) {
+    const bool in_order = kind == ring::StreamKind::frames || kind == ring::StreamKind::imu;
+    return in_order ? item.time.epoch : 0;
+}
+
+/// False also where nobody knows: what belongs to another epoch is rather recorded than lost.
+bool is_older(const EpochTime& time, const EpochTime& from) {
+    if (time.epoch == no_epoch) return time.output() < from.output();
+    const auto since = time.since(from);
+    return since && *since < Duration{};
 }
 
 /// Evidence and clock are of the service's whole run.
@@ -73,7 +78,7 @@ struct Source {
     bool begun = false;  ///< an item of it was taken
     OutputTime last{};   ///< stamp of the newest that was
     /// What is older is not wanted, and what was overwritten before the first item not missed.
-    std::optional<OutputTime> from{};
+    std::optional<EpochTime> from{};
     /// Gaps before the first item: they have no time until it comes.
     std::vector<std::pair<GapReason, std::uint64_t>> unreported{};
 
@@ -204,25 +209,28 @@ Expected<> Recorder::open_stream(const std::string& name, ring::Position start) 
     const bool whole = !has_stamps(reader->kind());
     if (whole) reader->seek(ring::Position::oldest);
     sources_.push_back(std::make_unique<Source>(Source{name, std::move(*reader)}));
-    if (whole) sources_.back()->from = OutputTime{std::numeric_limits<std::int64_t>::min()};
+    if (whole)
+        sources_.back()->from = EpochTime{0, std::numeric_limits<std::int64_t>::min(), no_epoch};
     report_.streams[name].kind = sources_.back()->kind();
     return {};
 }
 
 /// So far before the newest item of all: of a stream with nothing new for long, nothing is wanted.
 void Recorder::go_back() {
-    std::optional<OutputTime> newest;
+    std::optional<EpochTime> newest;
     for (const auto& source : sources_) {
         if (!has_stamps(source->kind())) continue;
         const auto item = source->reader.latest();
-        if (item) newest = newest ? std::max(*newest, item->time) : item->time;
+        if (!item || item->time.epoch == no_epoch) continue;
+        if (!newest || newest->precedes(item->time)) newest = item->time;
     }
     if (!newest) return;
-    report_.from = *newest - *settings_.before;
+    newest->ns -= settings_.before->ns;
+    report_.from = newest->output();
     for (const auto& source : sources_) {
         if (!has_stamps(source->kind())) continue;
         source->reader.seek(ring::Position::oldest);
-        source->from = report_.from;
+        source->from = newest;
     }
 }
 
@@ -408,13 +416,13 @@ void Recorder::take_pause(Source& source, const ring::NoItem& none) {
 /// The first item of a stream, and each of another epoch.
 void Recorder::begin(Source& source, const ring::Item& item) {
     source.from.reset();
-    const std::uint32_t epoch = epoch_of(source.kind(), item.metadata);
+    const std::uint32_t epoch = epoch_of(source.kind(), item);
     if (source.begun && epoch != source.epoch) {
         ++report_.streams[source.name].epochs;
         writer_->write_gap(source.name, GapReason::epoch, 0, source.last, source.last, epoch);
     }
     for (const auto& [reason, items] : std::exchange(source.unreported, {}))
-        writer_->write_gap(source.name, reason, items, {}, item.time, epoch);
+        writer_->write_gap(source.name, reason, items, {}, item.time.output(), epoch);
     source.epoch = epoch;
 }
 
@@ -435,14 +443,14 @@ Expected<> Recorder::take_item(Source& source, ring::Item item) {
     if (source.kind() == ring::StreamKind::events &&
         static_cast<std::uint32_t>(unpack<EventMetadata>(item.metadata).kind) == slipped)
         ++report_.slips;
-    count(source.name, item.time);
-    source.last = item.time;
+    source.last = item.time.output();
+    count(source.name, source.last);
     source.begun = true;
     return {};
 }
 
 Expected<> Recorder::take_frame(Source& source, ring::Item item) {
-    const OutputTime time = item.time;
+    const OutputTime time = item.time.output();
     const auto frame = unpack<FrameMetadata>(item.metadata);
     if (png_frames_ && can_be_png(frame, item.payload.size())) {
         if (png_frames_->full())
@@ -484,7 +492,7 @@ Expected<> Recorder::write_png_frames(bool all) {
             ++report_.streams[encoded->stream].lost;
             return written;
         }
-        count(encoded->stream, encoded->item.time);
+        count(encoded->stream, encoded->item.time.output());
     }
     return {};
 }
@@ -494,7 +502,7 @@ Expected<> Recorder::take(Source& source) {
         auto item = source.reader.next();
         if (item) {
             source.gone = false;
-            if (source.from && item->time < *source.from) continue;
+            if (source.from && is_older(item->time, *source.from)) continue;
             ++i;
             if (auto taken = take_item(source, std::move(*item)); !taken) return taken;
             continue;

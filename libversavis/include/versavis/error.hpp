@@ -9,10 +9,25 @@
 
 namespace versavis {
 
+/// What a program may want to distinguish. The numbers are those of the C interface.
+enum class ErrorCode : int {
+    other = -1,
+    invalid = -2,      ///< an argument is out of range, or does not fit the others
+    no_memory = -3,    ///< no memory left
+    absent = -4,       ///< there is no such stream: not yet, or not any more
+    forbidden = -5,    ///< no permission
+    not_trusted = -6,  ///< the stream belongs to, or can be changed by, somebody else
+    wrong_kind = -7,   ///< a stream of another kind
+    unsupported = -8,  ///< a ring of a layout that this library does not know
+    damaged = -9,      ///< no ring, or a damaged one
+    exhausted = -10,   ///< no descriptor or thread available
+};
+
 struct Error {
     std::string where;  ///< the file, stream, device or key concerned
     std::string what;   ///< what happened
     std::string cure;   ///< what the user can do next; empty when there is nothing to do
+    ErrorCode code = ErrorCode::other;
 
     /// "where: what; cure" on one line.
     std::string message() const {
@@ -80,6 +95,12 @@ class [[nodiscard]] Expected<void, E> {
 
 inline Unexpected<> failure(std::string where, std::string what, std::string cure = {}) {
     return Unexpected<>(Error{std::move(where), std::move(what), std::move(cure)});
+}
+
+/// A template, so that nothing but an ErrorCode is taken for one.
+template <class Code, class = std::enable_if_t<std::is_same_v<Code, ErrorCode>>>
+Unexpected<> failure(Code code, std::string where, std::string what, std::string cure = {}) {
+    return Unexpected<>(Error{std::move(where), std::move(what), std::move(cure), code});
 }
 
 }  // namespace versavis

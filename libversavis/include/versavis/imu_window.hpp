@@ -40,27 +40,28 @@ class VERSAVIS_API ImuWindow {
     /// Errors: as for ImuStream::open. It begins with what the ring still holds.
     static Expected<ImuWindow> open(const std::string& name, const StreamOptions& options = {});
 
-    /// Samples of `epoch`, that of the instants, with `after` < time <= `upto`. Waits until one of
-    /// `upto` or later has come, or of a later epoch, for `patience` at most. Spans may follow each
-    /// other or overlap; what lies before `after` is forgotten, but found again as long as the ring
-    /// holds it. Error: Pause::restarted, once: times before and after do not compare.
-    Expected<ImuSpan, NoItem> between(OutputTime after, OutputTime upto, std::uint32_t epoch,
+    /// Samples with `after` < time <= `upto`. Waits until one of `upto` or later has come, or of a
+    /// later epoch, for `patience` at most. Spans may follow each other or overlap; what lies
+    /// before `after` is forgotten, but found again as long as the ring holds it. Instants of two
+    /// epochs have no samples between them: SpanGap::epoch. Error: Pause::restarted, once: times
+    /// before and after do not compare.
+    Expected<ImuSpan, NoItem> between(const EpochTime& after, const EpochTime& upto,
                                       Duration patience);
 
     /// Takes what has come, without waiting. Error: Pause::restarted.
     Expected<void, NoItem> collect();
 
     /// True when a sample of this time or later has come, or one of a later epoch.
-    bool reaches(OutputTime time, std::uint32_t epoch) const;
+    bool reaches(const EpochTime& time) const;
 
     /// As between(), of what was collected.
-    ImuSpan take(OutputTime after, OutputTime upto, std::uint32_t epoch);
+    ImuSpan take(const EpochTime& after, const EpochTime& upto);
 
     ring::Reader& reader() { return stream_.reader(); }
 
  private:
     explicit ImuWindow(ImuStream stream) : stream_(std::move(stream)) {}
-    void look_back(OutputTime after, std::uint32_t epoch);
+    void look_back(const EpochTime& after);
     void forget();
 
     ImuStream stream_;

@@ -42,8 +42,7 @@ struct NoItem {
 
 struct Item {
     std::uint64_t number = 0;  ///< since the segment was made
-    std::uint64_t life = 0;    ///< of the service that published it; 0: older than ABI 1.5
-    OutputTime time;
+    EpochTime time;            ///< of a status document without an epoch
     Metadata metadata{};
     bool stale = false;  ///< its writer was dead, or had closed the stream, when this was read
     Payload payload;
@@ -71,13 +70,15 @@ struct Options {
     /// Only streams of a service with `sealed = true`: no one, not even their owner, can cut them
     /// short, which ends a program that reads with SIGBUS.
     bool sealed_only = false;
+    /// How long open() waits for a stream that is not there yet.
+    Duration wait{};
 };
 
 /// Not thread-safe: one thread at a time may call it; any number of readers may exist.
 class VERSAVIS_API Reader {
  public:
-    /// Maps `path`. Errors: not there, no permission, not owned by whom it should be, not a ring,
-    /// unknown layout.
+    /// Maps `path`. Errors: absent (in the time that `options` give it), forbidden, not_trusted,
+    /// damaged, unsupported, no_memory, exhausted.
     static Expected<Reader> open(const std::filesystem::path& path, const Options& options = {});
 
     Reader(Reader&&) noexcept;
@@ -101,9 +102,10 @@ class VERSAVIS_API Reader {
     /// Goes to a place among the items that there are.
     void seek(Position position);
 
-    /// Goes to the oldest item from which on no output time is before `time`; or to one that is
-    /// so many `earlier`, if there are.
-    void seek(OutputTime time, std::uint64_t earlier = 0);
+    /// Goes to the oldest item from which on none is before `time` (items of later epochs are not);
+    /// or to one that is so many `earlier`, if there are. False: `time` is of another life, or of
+    /// no epoch, as are the items of a status stream; it stays where it is.
+    bool seek(const EpochTime& time, std::uint64_t earlier = 0);
 
     /// A file descriptor for poll or epoll, the reader's own: readable when a call of next() may
     /// find something, until one finds nothing. Errors: no descriptor or thread available.

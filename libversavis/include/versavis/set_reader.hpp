@@ -15,10 +15,8 @@
 namespace versavis {
 
 struct VERSAVIS_API FrameSet {
-    std::uint64_t life = 0;
-    std::uint32_t epoch = 0;
     std::uint64_t tick = 0;
-    OutputTime time;                           ///< of the first camera that is there
+    EpochTime time;                            ///< of the first camera that is there
     Duration spread;                           ///< latest less earliest stamp
     std::vector<std::optional<Frame>> frames;  ///< in the order in which cameras were named
     /// After the set before, up to the latest stamp of this one. The first set has no samples, and
@@ -32,8 +30,10 @@ struct VERSAVIS_API FrameSet {
 struct SetOptions : StreamOptions {
     std::string imu;                        ///< name of its stream; empty: none
     Duration patience = milliseconds(200);  ///< from a set's first frame until it is given up
-    bool partial = false;                   ///< sets that lack a frame are delivered, too
-    bool suspect = false;                   ///< frames whose pairing is not proved count, too
+    /// Sets that lack a frame are delivered, too: at once, where a camera has ended. A camera that
+    /// is not there yet is taken in when it appears.
+    bool partial = false;
+    bool suspect = false;  ///< frames whose pairing is not proved count, too
 };
 
 /// What became of frames that are in no set.
@@ -42,14 +42,16 @@ struct SetReport {
     std::uint64_t incomplete = 0;  ///< sets that lacked a frame, delivered or not
     /// Frames without a tick, suspect, of another life of the service, or of a set given up before.
     std::uint64_t left_out = 0;
-    std::uint64_t lost = 0;  ///< frames overwritten before they were read
+    std::uint64_t lost = 0;     ///< frames overwritten before they were read
+    std::uint64_t skipped = 0;  ///< sets that latest() passed over
 };
 
 /// Not thread-safe. Cameras must be triggered by the board; a set is of one grid point, so cameras
 /// of different rates meet where their grids do.
 class VERSAVIS_API SetReader {
  public:
-    /// Errors: as for FrameStream::open and ImuStream::open; no camera named, or one twice.
+    /// Errors: as for FrameStream::open and ImuStream::open; invalid: no camera named, or one
+    /// twice.
     static Expected<SetReader> open(const std::vector<std::string>& cameras,
                                     const SetOptions& options = {});
     SetReader(SetReader&&) noexcept;
@@ -60,6 +62,10 @@ class VERSAVIS_API SetReader {
     /// Pause::nothing, restarted (once for all streams) or gone; frames that were lost only count.
     Expected<FrameSet, NoItem> next(Duration timeout);
 
+    /// The newest set that there is, passing over older ones; if there is none, waits up to
+    /// `timeout` for the next. Its IMU samples are those since the set that was delivered before.
+    Expected<FrameSet, NoItem> latest(Duration timeout);
+
     /// For poll and epoll: readable when next() may have a set, until it has none. Errors: no
     /// descriptor or thread available.
     Expected<int> fd();
@@ -69,6 +75,7 @@ class VERSAVIS_API SetReader {
  private:
     struct State;
     explicit SetReader(std::unique_ptr<State> state);
+    Expected<FrameSet, NoItem> take(Duration timeout, bool newest);
     std::unique_ptr<State> state_;
 };
 

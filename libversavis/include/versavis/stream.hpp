@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "ring_path.hpp"
 #include "ring_reader.hpp"
@@ -57,14 +58,16 @@ class Stream {
  public:
     using Result = Expected<T, NoItem>;
 
-    /// Errors: no such stream, no permission, a stream of another kind, and those of Reader::open.
+    /// Errors: invalid: no name of a stream; wrong_kind; and those of Reader::open.
     static Expected<Stream> open(const std::string& name, const StreamOptions& options = {}) {
         if (!is_stream_name(name))
-            return failure(name, "is not a name of a stream", "see 'versavis list'");
+            return failure(ErrorCode::invalid, name, "is not a name of a stream",
+                           "see 'versavis list'");
         auto reader = ring::Reader::open(stream_path(options.instance, name), options);
         if (!reader) return Unexpected(reader.error());
         if (reader->kind() != kind)
-            return failure(name, "is a stream of another kind", "see 'versavis list'");
+            return failure(ErrorCode::wrong_kind, name, "is a stream of another kind",
+                           "see 'versavis list'");
         return Stream(std::move(*reader));
     }
 
@@ -86,6 +89,20 @@ class Stream {
 
     ring::Reader reader_;
 };
+
+/// One stream of an instance, as `versavis list` shows it.
+struct StreamInfo {
+    std::string name;
+    ring::StreamKind kind{};
+    std::uint64_t published = 0;  ///< items since it was made
+    std::uint64_t retained = 0;   ///< how many can be read at any one time, at most
+    bool alive = false;           ///< its writer is
+    std::optional<Error> error;   ///< it cannot be opened; of the rest, only its name is known
+};
+
+/// The streams of an instance, by name. `options` as for opening them; it waits for nothing.
+/// Errors: absent: no such instance; forbidden.
+VERSAVIS_API Expected<std::vector<StreamInfo>> list_streams(const StreamOptions& options = {});
 
 using FrameStream = Stream<Frame, ring::StreamKind::frames>;
 using ImuStream = Stream<ImuSample, ring::StreamKind::imu>;

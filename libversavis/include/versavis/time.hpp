@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <optional>
 
 #include "versavis/export.hpp"
 
@@ -55,6 +57,49 @@ using HostTime = Time<struct HostClockTag>;    ///< CLOCK_MONOTONIC_RAW of this 
 using OutputTime =
     Time<struct OutputClockTag>;  ///< the clock that the user chose for published stamps
 using CameraTime = Time<struct CameraClockTag>;  ///< a camera's own clock
+
+/// The epoch of what belongs to none, as a status document.
+inline constexpr std::uint32_t no_epoch = 0xFFFFFFFFU;
+
+/// An instant of the output time, with what it belongs to. Instants of two epochs do not compare:
+/// in between, the output clock or the board's clock was set, or the service restarted. So nothing
+/// compares them as they are; since() looks first.
+struct EpochTime {
+    std::uint64_t life = 0;  ///< of the service; 0: older than ABI 1.5
+    std::int64_t ns = 0;
+    std::uint32_t epoch = no_epoch;
+
+    constexpr bool compares_with(const EpochTime& other) const {
+        return epoch != no_epoch && epoch == other.epoch && life == other.life;
+    }
+
+    /// The span from `earlier` to here, negative if that is later; one that no Duration can hold
+    /// is the longest there is. None: of two epochs, or of none.
+    constexpr std::optional<Duration> since(const EpochTime& earlier) const {
+        if (!compares_with(earlier)) return std::nullopt;
+        std::int64_t span = 0;
+        if (!__builtin_sub_overflow(ns, earlier.ns, &span)) return Duration{span};
+        return Duration{ns < earlier.ns ? std::numeric_limits<std::int64_t>::min()
+                                        : std::numeric_limits<std::int64_t>::max()};
+    }
+
+    /// True when it was published before: an earlier epoch precedes a later one, whatever their
+    /// times say. Both are of one life.
+    constexpr bool precedes(const EpochTime& other) const {
+        return epoch != other.epoch ? epoch < other.epoch : ns < other.ns;
+    }
+
+    /// Without what it belongs to: for one who knows that all of them are of one epoch.
+    constexpr OutputTime output() const { return {ns}; }
+
+    friend bool operator==(const EpochTime&, const EpochTime&) = delete;
+    friend bool operator!=(const EpochTime&, const EpochTime&) = delete;
+    friend bool operator<(const EpochTime&, const EpochTime&) = delete;
+    friend bool operator>(const EpochTime&, const EpochTime&) = delete;
+    friend bool operator<=(const EpochTime&, const EpochTime&) = delete;
+    friend bool operator>=(const EpochTime&, const EpochTime&) = delete;
+    friend Duration operator-(const EpochTime&, const EpochTime&) = delete;
+};
 
 /// Middle of an interval, without overflow; rounds towards `begin`.
 template <class Clock>
