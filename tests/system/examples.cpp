@@ -35,6 +35,8 @@ const std::vector<Example> examples{
     {{test::program("example-viewer-c")}, "first byte", "the service is gone"},
     {{test::program("example-stereo-c")}, "samples", "the service is gone"},
     {{test::program("example-epoll-c")}, "a frame of", ""},
+    {{test::program("viewer-abi-1.0")}, "first byte", "the service is gone"},
+    {{test::program("stereo-abi-1.0")}, "samples", "the service is gone"},
     {python("viewer.py"), "ns +- ", "the service is gone"},
     {python("stereo.py"), "IMU samples", "the service is gone"},
     {python("epoll.py"), "imu0", ""},
