@@ -47,14 +47,15 @@ std::optional<std::uint32_t> user_id(const char* name) {
 /// The kernel's name for users whom a user namespace does not map.
 constexpr std::uint32_t unmapped_user = 65534;
 
-/// True where all users are mapped, each to itself.
+/// True where all users are mapped, each to itself. A namespace whose map is not written yet, and
+/// is empty, maps nobody.
 bool maps_all_users() {
     std::ifstream map("/proc/self/uid_map");
+    if (!map.is_open()) return true;
     std::uint64_t inside{};
     std::uint64_t outside{};
     std::uint64_t count{};
-    return !(map >> inside >> outside >> count) ||
-           (inside == 0 && outside == 0 && count == UINT32_MAX);
+    return map >> inside >> outside >> count && inside == 0 && outside == 0 && count == UINT32_MAX;
 }
 
 Unexpected<> not_trusted(const std::filesystem::path& path, std::uint32_t user,
@@ -94,6 +95,8 @@ bool may_own(std::uint32_t user, std::optional<std::uint32_t> named) {
     if (named) return user == *named;
     const char* name = std::getenv("VERSAVIS_OWNER");
     if (name != nullptr && *name != '\0') return user_id(name) == user;
+    // An unmapped user may be anybody, also where this process itself is not mapped.
+    if (user == unmapped_user && !maps_all_users()) return false;
     return user == 0 || user == ::geteuid() || user == user_id(service_user);
 }
 

@@ -148,6 +148,11 @@ TEST_CASE_METHOD(TrustedInstance, "trust: an owner whom a container does not map
         ::setenv("VERSAVIS_OWNER", "65534", 1);
         return enter_namespace_of_one_user() && refusal().empty();
     }));
+    CHECK(test::in_process([&] {  // not even itself: it is 65534, too
+        return ::unshare(CLONE_NEWUSER) == 0 && ::geteuid() == 65534 &&
+               refusal().find("belongs to a user that this container does not map") !=
+                   std::string::npos;
+    }));
     give_to(65534);  // a user of that number, where all are mapped
     CHECK_THAT(refusal(), Catch::Contains("belongs to user 65534, who is neither root"));
 }
