@@ -85,10 +85,13 @@ int fail(versavis_error* error, const Error& why) {
 template <class T>
 constexpr std::uint32_t first_size = sizeof(T);
 
+/// No structure of any header becomes larger: a size beyond it is what lay on the stack.
+constexpr std::uint32_t most_size = 4096;
+
 /// True when the caller's structure has at least what it had at first.
 template <class T>
 bool has_size(const T* caller) {
-    return caller != nullptr && caller->size >= first_size<T>;
+    return caller != nullptr && caller->size >= first_size<T> && caller->size <= most_size;
 }
 
 /// What the caller asks for, as far as its header goes. None: it has no size, or asks for something

@@ -78,6 +78,7 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     void add(std::size_t camera, Frame frame);
     bool decided(const Key& key, const Pending& set) const;
     bool deliverable(const Pending& set) const;
+    bool covered(const Pending& set) const;
     void skip_older();
     std::optional<FrameSet> ready();
     FrameSet finish(const Key& key, Pending set);
@@ -125,6 +126,7 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
         }
         report.lost += frame.error().lost;
         if (frame.error().why == Pause::lost) ++losses;
+        if (frame.error().why == Pause::restarted) ended[camera] = false;
         if (auto pause = restarted(frame.error(), cameras[camera]->reader().life())) return pause;
         if (auto pause = gone(frame.error(), camera)) return pause;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
@@ -202,6 +204,13 @@ bool SetReader::State::deliverable(const Pending& set) const {
                                           [](const auto& frame) { return frame.has_value(); });
 }
 
+/// True when its samples are there, or are not waited for any more.
+bool SetReader::State::covered(const Pending& set) const {
+    return !imu || is_over(set.give_up) ||
+           std::all_of(set.frames.begin(), set.frames.end(),
+                       [&](const auto& frame) { return !frame || imu->reaches(frame->time); });
+}
+
 FrameSet SetReader::State::finish(const Key& key, Pending set) {
     FrameSet made;
     made.tick = key.second;
@@ -232,22 +241,19 @@ ImuSpan SetReader::State::samples_until(const EpochTime& latest) {
 std::optional<FrameSet> SetReader::State::ready() {
     while (!pending.empty()) {
         const auto first = pending.begin();
-        const auto& frames = first->second.frames;
-        if (!decided(first->first, first->second)) return std::nullopt;
-        const bool whole = std::all_of(frames.begin(), frames.end(), [](auto& f) { return !!f; });
-        if (!deliverable(first->second)) {
+        const Pending& set = first->second;
+        if (!decided(first->first, set)) return std::nullopt;
+        if (!deliverable(set)) {
             ++report.incomplete;
             finished = first->first;
             pending.erase(first);
             continue;
         }
-        const auto covered = [&](const auto& frame) { return !frame || imu->reaches(frame->time); };
-        if (imu && !is_over(first->second.give_up) &&
-            !std::all_of(frames.begin(), frames.end(), covered))
-            return std::nullopt;
-        if (!whole) ++report.incomplete;
+        if (!covered(set)) return std::nullopt;
         auto node = pending.extract(first);
-        return finish(node.key(), std::move(node.mapped()));
+        FrameSet made = finish(node.key(), std::move(node.mapped()));
+        if (!made.complete()) ++report.incomplete;
+        return made;
     }
     return std::nullopt;
 }
@@ -255,7 +261,7 @@ std::optional<FrameSet> SetReader::State::ready() {
 /// Forgets what comes before the newest set that can be delivered.
 void SetReader::State::skip_older() {
     const auto newest_set = std::find_if(pending.rbegin(), pending.rend(), [&](const auto& set) {
-        return decided(set.first, set.second) && deliverable(set.second);
+        return decided(set.first, set.second) && deliverable(set.second) && covered(set.second);
     });
     while (newest_set != pending.rend() && pending.begin()->first < newest_set->first) {
         const auto first = pending.begin();

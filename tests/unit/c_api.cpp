@@ -928,6 +928,14 @@ TEST_CASE_METHOD(CApi, "c_api: a structure without its size is refused, and not 
         };
         CHECK((untouched(item) && untouched(image) && untouched(set) && untouched(report)));
     }
+    versavis_item garbage;
+    versavis_set other_garbage;
+    std::memset(&garbage, 0xCC, sizeof garbage);
+    std::memset(&other_garbage, 0xCC, sizeof other_garbage);
+    CHECK(versavis_next(stream, &garbage, 0) == VERSAVIS_INVALID);
+    CHECK(versavis_sets_next(sets, &other_garbage, 0) == VERSAVIS_INVALID);
+    versavis_release(&garbage);
+    versavis_set_release(&other_garbage);
     versavis_release(&good);
     versavis_sets_close(sets);
     versavis_close(stream);

@@ -649,3 +649,18 @@ TEST_CASE_METHOD(Rig, "set_reader: the newest set comes with all samples since t
     CHECK(sets.latest({})->tick == 6);
     CHECK(sets.report().skipped == 3);
 }
+
+TEST_CASE_METHOD(Rig, "set_reader: a newest set whose samples lag does not take the one before") {
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    SetReader sets = open(with_imu);
+    for (std::uint64_t tick = 1; tick <= 5; ++tick) {  // a program that looks once a frame
+        frame(*a, tick);
+        frame(*b, tick);
+        const auto set = sets.latest({});
+        CHECK(set.has_value() == (tick > 1));
+        if (set) CHECK(set->tick == tick - 1);
+        sample(time_of(tick));
+    }
+    CHECK(sets.report().skipped == 0);
+}
