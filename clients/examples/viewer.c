@@ -9,8 +9,8 @@ static void print_frame(const versavis_item* item, const versavis_image* image, 
     char sigma[24] = "unknown";
     if (item->data.frame.sigma != VERSAVIS_SIGMA_UNKNOWN)
         snprintf(sigma, sizeof sigma, "%" PRIu32 " ns", item->data.frame.sigma);
-    printf("%" PRId64 " ns +- %s: %" PRIu32 " x %" PRIu32 " %s, first byte %u\n", item->time.ns, sigma,
-           image->width, image->height, versavis_pixel_format_name(image->pixel_format),
+    printf("%" PRId64 " ns +- %s: %" PRIu32 " x %" PRIu32 " %s, first byte %u\n", item->time.ns,
+           sigma, image->width, image->height, versavis_pixel_format_name(image->pixel_format),
            (unsigned)first);
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/sealed.hpp"
-#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -11,6 +10,8 @@
 #include <cstring>
 #include <string>
 #include <system_error>
+
+#include "client/error_code.hpp"
 
 namespace versavis::ring {
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/segment.hpp"
-#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -12,6 +11,8 @@
 #include <cstring>
 #include <string>
 #include <system_error>
+
+#include "client/error_code.hpp"
 
 namespace versavis::ring {
 

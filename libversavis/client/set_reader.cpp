@@ -295,13 +295,15 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
     state->retry = HostTime{INT64_MAX};
     const HostTime deadline = deadline_after(options.wait);
     for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        // With partial sets, none is waited for: those that are not there are taken in later.
+        state->options.wait = options.partial ? Duration{} : left_until(deadline);
         const auto opened = state->open(camera);
-        state->options.wait = left_until(deadline);
         if (opened) continue;
         if (!options.partial || opened.error().code != ErrorCode::absent)
             return Unexpected(opened.error());
         state->retry = host_now() + retry_period;
     }
+    state->options.wait = left_until(deadline);
     if (!options.imu.empty()) {
         auto imu = ImuWindow::open(options.imu, state->options);
         if (!imu) return Unexpected(imu.error());

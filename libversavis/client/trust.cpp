@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/trust.hpp"
-#include "client/error_code.hpp"
 
 #include <fcntl.h>
 #include <pwd.h>
@@ -17,6 +16,7 @@
 #include <system_error>
 #include <utility>
 
+#include "client/error_code.hpp"
 #include "client/sealed.hpp"
 
 namespace versavis::ring {

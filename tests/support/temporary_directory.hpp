@@ -39,6 +39,14 @@ class TemporaryDirectory {
     std::filesystem::path path_;
 };
 
+/// The name of the instance whose streams are in this folder. Instances live in /dev/shm/versavis,
+/// which the name passes through, so it has to be there.
+inline std::string instance_in(const std::filesystem::path& directory) {
+    const std::filesystem::path instances = "/dev/shm/versavis";
+    std::filesystem::create_directory(instances);
+    return std::filesystem::relative(directory, instances);
+}
+
 /// Of a file; empty without one.
 inline std::string content_of(const std::filesystem::path& path) {
     std::ifstream file(path, std::ios::binary);

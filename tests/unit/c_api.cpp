@@ -29,7 +29,7 @@ namespace {
 
 struct CApi {
     test::TemporaryDirectory directory{"/dev/shm"};
-    std::string instance = std::filesystem::relative(directory.path(), "/dev/shm/versavis");
+    std::string instance = test::instance_in(directory.path());
     std::unique_ptr<ring::Writer> camera = make("cam0");
 
     std::unique_ptr<ring::Writer> make(const std::string& name,

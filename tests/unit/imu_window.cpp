@@ -26,7 +26,7 @@ struct Samples {
     }
     ImuWindow open() const {
         StreamOptions options;
-        options.instance = std::filesystem::relative(directory.path(), "/dev/shm/versavis");
+        options.instance = test::instance_in(directory.path());
         auto window = ImuWindow::open("imu", options);
         REQUIRE(window);
         return std::move(*window);

@@ -38,7 +38,7 @@ class FuzzVictim {
 
     std::filesystem::path path() const { return directory_.path() / "victim"; }
     std::string instance() const {
-        return std::filesystem::relative(directory_.path(), "/dev/shm/versavis");
+        return test::instance_in(directory_.path());
     }
 
     void publish() {

@@ -276,7 +276,8 @@ class StreamInfo:
         self.kind = KIND_NAMES.get(info.kind)
         self.published, self.retained = info.published, info.retained
         self.alive = bool(info.alive)
-        self.error = error_of(info.error, info.why.decode("utf-8", "replace")) if info.error else None
+        why = info.why.decode("utf-8", "replace")
+        self.error = error_of(info.error, why) if info.error else None
 
     def __repr__(self):
         return f"<versavis.StreamInfo {self.name}, {self.error or self.kind}>"

@@ -7,8 +7,8 @@ from .errors import OtherEpoch
 
 
 class Time:
-    """An instant: `ns`, and the `epoch` and `life` of the service that it belongs to. Epoch None: it
-    belongs to none, as that of a status document.
+    """An instant: `ns`, and the `epoch` and `life` of the service that it belongs to. Epoch None:
+    it belongs to none, as that of a status document.
 
     Times of one epoch compare; one less another is nanoseconds; and nanoseconds can be added and
     subtracted. Times of two epochs do not compare, as a clock was set in between, or the service
@@ -41,7 +41,9 @@ class Time:
         return self.ns - self._checked(other).ns
 
     def __add__(self, ns):
-        return Time(self.life, self.epoch, self.ns + ns) if isinstance(ns, Integral) else NotImplemented
+        if not isinstance(ns, Integral):
+            return NotImplemented
+        return Time(self.life, self.epoch, self.ns + ns)
 
     def __lt__(self, other):
         return self.ns < self._checked(other).ns if isinstance(other, Time) else NotImplemented

@@ -77,7 +77,8 @@ class LiveCamera {
             tracker_.reset();
             return {};
         }
-        if (tracker_ && frame.time.since(followed_) < least_interval) return {};
+        const auto since = frame.time.since(followed_);
+        if (tracker_ && since && *since < least_interval) return {};
         const auto view = frame.image();
         if (!view) return {};  // it has fewer pixels than it should
         if (view->layout.channels == 0)

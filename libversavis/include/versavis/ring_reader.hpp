@@ -42,7 +42,7 @@ struct NoItem {
 
 struct Item {
     std::uint64_t number = 0;  ///< since the segment was made
-    EpochTime time;            ///< of a status document without an epoch
+    EpochTime time;            ///< that of a status document has no epoch
     Metadata metadata{};
     bool stale = false;  ///< its writer was dead, or had closed the stream, when this was read
     Payload payload;

@@ -5,8 +5,8 @@
 
 #include <cstdint>
 #include <limits>
-#include <optional>
 
+#include "versavis/error.hpp"
 #include "versavis/export.hpp"
 
 namespace versavis {
@@ -61,6 +61,9 @@ using CameraTime = Time<struct CameraClockTag>;  ///< a camera's own clock
 /// The epoch of what belongs to none, as a status document.
 inline constexpr std::uint32_t no_epoch = 0xFFFFFFFFU;
 
+/// Why there is no span between two instants: they are of two epochs, or of none.
+struct OtherEpoch {};
+
 /// An instant of the output time, with what it belongs to. Instants of two epochs do not compare:
 /// in between, the output clock or the board's clock was set, or the service restarted. So nothing
 /// compares them as they are; since() looks first.
@@ -74,9 +77,10 @@ struct EpochTime {
     }
 
     /// The span from `earlier` to here, negative if that is later; one that no Duration can hold
-    /// is the longest there is. None: of two epochs, or of none.
-    constexpr std::optional<Duration> since(const EpochTime& earlier) const {
-        if (!compares_with(earlier)) return std::nullopt;
+    /// is the longest there is. No optional, which would compare with a Duration: "nothing" is less
+    /// than all of them.
+    Expected<Duration, OtherEpoch> since(const EpochTime& earlier) const {
+        if (!compares_with(earlier)) return Unexpected<OtherEpoch>({});
         std::int64_t span = 0;
         if (!__builtin_sub_overflow(ns, earlier.ns, &span)) return Duration{span};
         return Duration{ns < earlier.ns ? std::numeric_limits<std::int64_t>::min()

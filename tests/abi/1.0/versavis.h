@@ -39,7 +39,7 @@ typedef enum versavis_result {
     VERSAVIS_GONE = 4,      /* the service has stopped or died; there is no new one yet */
     VERSAVIS_OVERTAKEN = 5, /* the writer needed the memory: what was read or copied is void */
     VERSAVIS_ERROR = -1,    /* see versavis_error */
-    VERSAVIS_INVALID = -2,  /* an argument is NULL, out of range, without size, or of another kind */
+    VERSAVIS_INVALID = -2, /* an argument is NULL, out of range, without size, of another kind */
     VERSAVIS_NO_MEMORY = -3,   /* no memory left */
     VERSAVIS_ABSENT = -4,      /* there is no such stream: not yet, or not any more */
     VERSAVIS_FORBIDDEN = -5,   /* no permission */
