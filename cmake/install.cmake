@@ -3,7 +3,7 @@
 include(GNUInstallDirs)
 set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/versavis)
 
-install(TARGETS versavisd versavis_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS versavisd versavis_tool versavis-web RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY daemon/settings/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
     FILES_MATCHING PATTERN *.toml)
 # Only where there is a compiler for the chip.
@@ -39,7 +39,7 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
 # Manual pages, where there is scdoc, and completion for shells: both of what the programs say.
 find_program(scdoc scdoc)
 find_program(python python3)
-set(programs versavisd versavis_tool)
+set(programs versavisd versavis_tool versavis-web)
 if(TARGET versavis-rig)
     list(APPEND programs versavis-rig)
 endif()

@@ -33,6 +33,7 @@ foreach(pair
         versavisd.service.in:systemd/system/versavisd.service
         versavis-metrics.service.in:systemd/system/versavis-metrics.service
         versavis-verify.service.in:systemd/system/versavis-verify.service
+        versavis-web.service.in:systemd/system/versavis-web.service
         versavis-metrics.timer:systemd/system/versavis-metrics.timer
         60-versavis.rules:udev/rules.d/60-versavis.rules
         versavis.catalog:systemd/catalog/versavis.catalog

@@ -229,14 +229,14 @@ std::string witnesses(const json& status, const Proof& proof) {
     return text;
 }
 
-Conclusion because(Conclusion::State state, const std::string& why) {
+Conclusion because(Conclusion::State state, std::string why) {
+    if (!why.ends_with('?')) why += '.';
     switch (state) {
-        case Conclusion::State::right: return {state, "The synchronisation is right: " + why + "."};
-        case Conclusion::State::wrong:
-            return {state, "The synchronisation is not right: " + why + "."};
+        case Conclusion::State::right: return {state, "The synchronisation is right: " + why};
+        case Conclusion::State::wrong: return {state, "The synchronisation is not right: " + why};
         case Conclusion::State::unknown: break;
     }
-    return {state, "Whether the synchronisation is right is not known: " + why + "."};
+    return {state, "Whether the synchronisation is right is not known: " + why};
 }
 
 /// The first device, in the order of cause, that has this health; empty: none.
@@ -265,13 +265,15 @@ Findings check_service(const Subject& subject) {
 }
 
 Conclusion conclude(const Subject& subject) {
+    if (subject.status) return conclude(*subject.status);
+    return because(
+        Conclusion::State::unknown,
+        "there is no living service: " + subject.silence.what +
+            (subject.unit ? "; " + subject.unit->where + ": " + subject.unit->what : ""));
+}
+
+Conclusion conclude(const json& status) {
     using State = Conclusion::State;
-    if (!subject.status)
-        return because(
-            State::unknown,
-            "there is no living service: " + subject.silence.what +
-                (subject.unit ? "; " + subject.unit->where + ": " + subject.unit->what : ""));
-    const json& status = *subject.status;
     const std::string degraded = first_cause(status, "degraded");
     if (!degraded.empty()) return because(State::wrong, degraded);
     const std::string starting = first_cause(status, "starting");

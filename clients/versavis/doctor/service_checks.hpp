@@ -3,6 +3,8 @@
 // else wants its devices.
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include "doctor/finding.hpp"
 #include "doctor/subject.hpp"
 
@@ -12,5 +14,8 @@ Findings check_service(const Subject& subject);
 
 /// Whether the synchronisation is right, and by which figures of the service.
 Conclusion conclude(const Subject& subject);
+
+/// The same of the service's status document.
+Conclusion conclude(const nlohmann::json& status);
 
 }  // namespace versavis::client

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "routes.hpp"
+
+#include <charconv>
+
+#include "page_files.hpp"
+
+namespace versavis::web {
+
+namespace {
+
+constexpr std::string_view picture_path = "/api/picture/";
+
+/// None: no number.
+std::optional<std::uint64_t> number_of(const Target& target, const std::string& key,
+                                       std::uint64_t otherwise) {
+    const auto found = target.query.find(key);
+    if (found == target.query.end()) return otherwise;
+    std::uint64_t number = 0;
+    const char* end = found->second.data() + found->second.size();
+    const auto [read, error] = std::from_chars(found->second.data(), end, number);
+    if (error != std::errc() || read != end) return std::nullopt;
+    return number;
+}
+
+/// The address that a person opens gives the token once; from then on a cookie does.
+Response begin_session(const Request& request, const std::string& token) {
+    Response response = answer(request, http::status::see_other, "text/plain", "");
+    response.set(http::field::location, "/");
+    response.set(http::field::set_cookie,
+                 "versavis=" + token + "; HttpOnly; SameSite=Strict; Path=/");
+    return response;
+}
+
+/// None: it may go on.
+std::optional<Response> refuse(const Request& request, const Target& target,
+                               const Settings& settings) {
+    if (settings.token.empty()) {
+        const auto host = request[http::field::host];
+        if (names_loopback({host.data(), host.size()})) return std::nullopt;
+        return refusal(request, http::status::misdirected_request,
+                       "without a token this server answers to localhost and loopback addresses "
+                       "only; give it one: --token-file");
+    }
+    const auto given = target.query.find("token");
+    if (target.path == "/" && given != target.query.end() &&
+        equal_secrets(given->second, settings.token))
+        return begin_session(request, settings.token);
+    if (equal_secrets(token_of(request), settings.token)) return std::nullopt;
+    Response response =
+        refusal(request, http::status::unauthorized,
+                "a token is needed: open /?token=TOKEN, or send 'Authorization: Bearer TOKEN'");
+    response.set(http::field::www_authenticate, "Bearer");
+    return response;
+}
+
+Response picture(const Request& request, const Target& target, LiveData& data) {
+    const auto after = number_of(target, "after", 0);
+    const auto whole = number_of(target, "whole", 0);
+    if (!after || !whole || *whole > 1)
+        return refusal(request, http::status::bad_request,
+                       "'after' is the version of the last picture, and 'whole' 0 or 1");
+    const HostTime now = host_now();
+    const std::string camera = target.path.substr(picture_path.size());
+    const ShownPicture* shown = data.picture(camera, *whole == 1, now);
+    if (shown == nullptr)
+        return refusal(request, http::status::not_found,
+                       "no camera '" + camera + "' publishes; /api/state names those that do");
+    if (!shown->problem.empty())
+        return refusal(request, http::status::service_unavailable, shown->problem);
+    if (shown->version == 0 || shown->version == *after)
+        return answer(request, http::status::no_content, "image/jpeg", "");
+    Response response = answer(request, http::status::ok, "image/jpeg", shown->jpeg);
+    nlohmann::json facts = shown->facts;
+    facts["version"] = shown->version;
+    facts["age_s"] = static_cast<double>((now - shown->arrival).ns) * 1e-9;
+    response.set("X-Versavis-Frame", facts.dump());
+    return response;
+}
+
+/// None: not a file of the page.
+std::optional<Response> page_file(const Request& request, const std::string& path) {
+    const auto file = [&](std::string_view type, std::string_view content) {
+        return answer(request, http::status::ok, type, std::string(content));
+    };
+    if (path == "/") return file("text/html; charset=utf-8", page_html);
+    if (path == "/page.js") return file("text/javascript; charset=utf-8", page_script);
+    if (path == "/style.css") return file("text/css; charset=utf-8", page_style);
+    if (path == "/icon.svg") return file("image/svg+xml", page_icon);
+    return std::nullopt;
+}
+
+}  // namespace
+
+Response respond(const Request& request, const Settings& settings, LiveData& data) {
+    const auto text = request.target();
+    const auto target = parse_target({text.data(), text.size()});
+    if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
+    if (auto refused = refuse(request, *target, settings)) return std::move(*refused);
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+        Response response = refusal(request, http::status::method_not_allowed, "use GET");
+        response.set(http::field::allow, "GET, HEAD");
+        return response;
+    }
+    if (auto file = page_file(request, target->path)) return std::move(*file);
+    if (target->path == "/api/state")
+        return answer(request, http::status::ok, "application/json", data.state(host_now()));
+    if (target->path == "/metrics")
+        return answer(request, http::status::ok,
+                      "application/openmetrics-text; version=1.0.0; charset=utf-8",
+                      data.metrics(host_now()));
+    if (target->path.starts_with(picture_path)) return picture(request, *target, data);
+    return refusal(request, http::status::not_found, "there is no " + target->path);
+}
+
+}  // namespace versavis::web
