@@ -274,6 +274,7 @@ const ShownPicture* LiveData::picture(const std::string& name, bool whole, HostT
     ++shown.version;
     shown.life = frame->time.life;
     shown.number = frame->number;
+    shown.time = frame->time.output();
     shown.arrival = frame->data.arrival;
     shown.facts = facts_of(*frame, *picture);
     shown.jpeg = std::move(picture->jpeg);

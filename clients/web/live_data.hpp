@@ -23,6 +23,7 @@ struct ShownPicture {
     HostTime looked{INT64_MIN};  ///< for a newer one
     std::uint64_t life = 0;      ///< of the service, and
     std::uint64_t number = 0;    ///< of the frame in it
+    OutputTime time;             ///< its stamp
     HostTime arrival;
     std::string jpeg;
     nlohmann::json facts;

@@ -17,6 +17,7 @@
 #include "routes.hpp"
 #include "server.hpp"
 #include "versavis/ring_path.hpp"
+#include "viewer.hpp"
 
 namespace {
 
@@ -60,7 +61,10 @@ int serve(const Settings& settings) {
                              "give --token-file FILE, or only 127.0.0.1"},
                             EX_USAGE);
     LiveData data(settings.instance);
-    server->start([&](const Request& request) { return respond(request, settings, data); });
+    server->start({[&](const Request& request) { return respond(request, settings, data); },
+                   [&](boost::beast::tcp_stream& stream, Request request) {
+                       return serve_viewer(stream, std::move(request), settings, data);
+                   }});
     boost::asio::steady_timer timer(context);
     turn_by_turn(timer, data);
     boost::asio::signal_set signals(context, SIGINT, SIGTERM);
@@ -87,6 +91,8 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--port", settings.port, "To listen on; 0: any that is free")
         ->capture_default_str();
+    app.add_option("--allow-origin", settings.origins,
+                   "Whose pages may open WebSockets, as https://app.foxglove.dev");
     app.add_option("--token-file", token_file, "Whoever looks needs the token in this file");
     try {
         app.parse(argc, argv);

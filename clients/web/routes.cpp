@@ -3,6 +3,7 @@
 
 #include <charconv>
 
+#include "foxglove.hpp"
 #include "page_files.hpp"
 
 namespace versavis::web {
@@ -91,6 +92,27 @@ std::optional<Response> page_file(const Request& request, const std::string& pat
 }
 
 }  // namespace
+
+std::optional<Response> refuse_viewer(const Request& request, const Settings& settings) {
+    const auto text = request.target();
+    const auto target = parse_target({text.data(), text.size()});
+    if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
+    const auto given = target->query.find("token");
+    const bool known = !settings.token.empty() && given != target->query.end() &&
+                       equal_secrets(given->second, settings.token);
+    if (!known)
+        if (auto refused = refuse(request, *target, settings)) return refused;
+    const auto origin = request[http::field::origin];
+    if (!settings.allows({origin.data(), origin.size()}))
+        return refusal(request, http::status::forbidden,
+                       "a page of " + std::string(origin.data(), origin.size()) +
+                           " may not look; --allow-origin lets it");
+    const auto protocols = request[http::field::sec_websocket_protocol];
+    if (foxglove_protocol({protocols.data(), protocols.size()}).empty())
+        return refusal(request, http::status::bad_request,
+                       "this server speaks foxglove.sdk.v1 and foxglove.websocket.v1");
+    return std::nullopt;
+}
 
 Response respond(const Request& request, const Settings& settings, LiveData& data) {
     const auto text = request.target();

@@ -10,4 +10,8 @@ namespace versavis::web {
 
 Response respond(const Request& request, const Settings& settings, LiveData& data);
 
+/// Why a request for a WebSocket is not granted; none: it is. Pages of other origins may open
+/// sockets, unlike other requests: only those of `settings` may.
+std::optional<Response> refuse_viewer(const Request& request, const Settings& settings);
+
 }  // namespace versavis::web

@@ -3,15 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
 #include <cstddef>
 #include <list>
@@ -68,7 +67,7 @@ class Place {
     std::shared_ptr<Connections> all_;
 };
 
-asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handler handler, Place place) {
+asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handlers handlers, Place place) {
     beast::flat_buffer buffer;
     for (bool again = true; again;) {
         http::request_parser<http::string_body> parser;
@@ -82,9 +81,13 @@ asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handler handler
         // Who speaks no HTTP is answered; who is gone, or says nothing, is not.
         if (error && error.category() != http::make_error_code({}).category()) break;
         if (error == http::error::end_of_stream || error == http::error::partial_message) break;
+        if (!error && beast::websocket::is_upgrade(parser.get()) && handlers.upgrade) {
+            co_await handlers.upgrade(stream, parser.release());
+            break;
+        }
         Response response = error ? refusal(parser.get(), http::status::bad_request,
                                             "no request: " + error.message())
-                                  : handler(parser.get());
+                                  : handlers.respond(parser.get());
         again = !error && response.keep_alive();
         response.keep_alive(again);
         stream.expires_after(patience);
@@ -99,7 +102,7 @@ asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handler handler
     stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
 }
 
-asio::awaitable<void> accept(tcp::acceptor& acceptor, Server::Handler handler) {
+asio::awaitable<void> accept(tcp::acceptor& acceptor, Server::Handlers handlers) {
     const auto connections = std::make_shared<Connections>();
     asio::steady_timer timer(acceptor.get_executor());
     while (acceptor.is_open()) {
@@ -111,7 +114,7 @@ asio::awaitable<void> accept(tcp::acceptor& acceptor, Server::Handler handler) {
         } else if (connections->make_place()) {
             asio::co_spawn(
                 acceptor.get_executor(),
-                converse(beast::tcp_stream(std::move(socket)), handler, Place(connections)),
+                converse(beast::tcp_stream(std::move(socket)), handlers, Place(connections)),
                 asio::detached);
         }
     }
@@ -139,8 +142,9 @@ Expected<Server> Server::listen(asio::io_context& context, const std::string& ad
     return Server(std::move(acceptor), acceptor.local_endpoint());
 }
 
-void Server::start(Handler handler) {
-    asio::co_spawn(acceptor_.get_executor(), accept(acceptor_, std::move(handler)), asio::detached);
+void Server::start(Handlers handlers) {
+    asio::co_spawn(acceptor_.get_executor(), accept(acceptor_, std::move(handlers)),
+                   asio::detached);
 }
 
 }  // namespace versavis::web

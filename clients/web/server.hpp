@@ -4,8 +4,12 @@
 // have been silent longest.
 #pragma once
 
+#include <utility>  // which asio 1.74 does not include by itself
+
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
 #include <functional>
 #include <string>
 
@@ -16,7 +20,11 @@ namespace versavis::web {
 
 class Server {
  public:
-    using Handler = std::function<Response(const Request&)>;
+    struct Handlers {
+        std::function<Response(const Request&)> respond;
+        /// Of a request for a WebSocket: what comes after it is the handler's.
+        std::function<boost::asio::awaitable<void>(boost::beast::tcp_stream&, Request)> upgrade{};
+    };
 
     /// Errors: no such address, or its port is in use.
     static Expected<Server> listen(boost::asio::io_context& context, const std::string& address,
@@ -24,8 +32,8 @@ class Server {
 
     boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
-    /// From here on `handler` answers, until the context stops.
-    void start(Handler handler);
+    /// From here on they answer, until the context stops.
+    void start(Handlers handlers);
 
  private:
     Server(boost::asio::ip::tcp::acceptor acceptor, boost::asio::ip::tcp::endpoint endpoint)

@@ -113,14 +113,15 @@ std::string ros_image_head(OutputTime time, std::string_view stream, const Frame
         .bytes();
 }
 
+std::string ros_compressed_head(OutputTime time, std::string_view stream, std::string_view format,
+                                std::uint32_t length) {
+    return CdrWriter().header(time, stream).text(format).number(length).bytes();
+}
+
 std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                          std::uint32_t length) {
     const std::string encoding = ros_encoding(frame.pixel_format);
-    return CdrWriter()
-        .header(time, stream)
-        .text(encoding + "; png compressed " + encoding)
-        .number(length)
-        .bytes();
+    return ros_compressed_head(time, stream, encoding + "; png compressed " + encoding, length);
 }
 
 std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame,

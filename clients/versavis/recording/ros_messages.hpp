@@ -19,7 +19,11 @@ std::string ros_encoding(std::uint32_t pixel_format);
 std::string ros_image_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                            std::uint32_t length);
 
-/// sensor_msgs/msg/CompressedImage up to the PNG, of which `length` bytes follow.
+/// sensor_msgs/msg/CompressedImage up to its data, of which `length` bytes follow.
+std::string ros_compressed_head(OutputTime time, std::string_view stream, std::string_view format,
+                                std::uint32_t length);
+
+/// The same of a PNG.
 std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                          std::uint32_t length);
 

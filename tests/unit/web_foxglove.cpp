@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "foxglove.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
+
+using namespace versavis;
+using namespace versavis::web;
+
+namespace {
+
+struct Viewed {
+    test::TemporaryDirectory directory{"/dev/shm"};
+    std::string instance = test::instance_in(directory.path());
+    ring::Writer imu = *ring::Writer::create(directory.path(), {"imu0", ring::StreamKind::imu, 64});
+    LiveData data{instance};
+    FoxgloveSession session{instance, data};
+    HostTime now{1'000'000'000};
+
+    nlohmann::json next_text() {
+        const auto text = session.next_text(now);
+        return text ? nlohmann::json::parse(*text) : nlohmann::json();
+    }
+    void publish(std::uint64_t number) {
+        ImuMetadata sample{};
+        sample.number = number;
+        imu.publish({static_cast<std::int64_t>(number)}, pack(sample));
+    }
+    /// A session with its channels known, and one subscription.
+    void subscribe() {
+        CHECK(next_text()["op"] == "serverInfo");
+        const auto advertised = next_text();
+        REQUIRE(advertised["channels"].size() == 1);
+        const auto id = advertised["channels"][0]["id"].get<int>();
+        session.receive(
+            nlohmann::json{{"op", "subscribe"}, {"subscriptions", {{{"id", 7}, {"channelId", id}}}}}
+                .dump());
+        CHECK(next_text().is_null());
+    }
+    /// Stamps of the messages that there are.
+    std::vector<std::int64_t> take() {
+        std::vector<std::int64_t> stamps;
+        while (const auto message = session.next_message(now)) {
+            REQUIRE(message->size() > 13);
+            CHECK(message->substr(0, 5) == std::string("\x01\x07\0\0\0", 5));
+            std::int64_t stamp = 0;
+            std::memcpy(&stamp, message->data() + 5, sizeof stamp);
+            stamps.push_back(stamp);
+        }
+        return stamps;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("web_foxglove: the protocol that both speak") {
+    CHECK(foxglove_protocol("foxglove.websocket.v1") == "foxglove.websocket.v1");
+    CHECK(foxglove_protocol("foxglove.websocket.v1, foxglove.sdk.v1") == "foxglove.sdk.v1");
+    CHECK(foxglove_protocol("x,foxglove.sdk.v1 ,y") == "foxglove.sdk.v1");
+    for (const char* other : {"", ",", " ", "foxglove.sdk.v2", "xfoxglove.sdk.v1", "foxglove"})
+        CHECK(foxglove_protocol(other).empty());
+}
+
+TEST_CASE("web_foxglove: what was subscribed comes, and what was overwritten is counted") {
+    Viewed viewed;
+    viewed.subscribe();
+    for (std::uint64_t number = 1; number <= 3; ++number) viewed.publish(number);
+    CHECK(viewed.take() == std::vector<std::int64_t>{1, 2, 3});
+    for (std::uint64_t number = 4; number <= 203; ++number) viewed.publish(number);
+    CHECK(viewed.take().empty());  // the item that says so is none
+    const auto rest = viewed.take();
+    REQUIRE_FALSE(rest.empty());
+    CHECK(rest.back() == 203);
+    viewed.now = viewed.now + seconds(6);
+    const auto status = viewed.next_text();
+    CHECK(status["level"] == 1);
+    CHECK(status["message"] == "/imu0/data_raw: " + std::to_string(200 - rest.size()) +
+                                   " messages were not sent, as the connection is slow");
+    viewed.session.receive(R"({"op":"unsubscribe","subscriptionIds":[7]})");
+    viewed.publish(204);
+    CHECK(viewed.take().empty());
+}
+
+TEST_CASE("web_foxglove: whatever a viewer sends, the worst is an answer") {
+    Viewed viewed;
+    viewed.subscribe();
+    for (const char* text :
+         {"",
+          "{",
+          "[]",
+          "null",
+          "7",
+          "\"subscribe\"",
+          R"({"op":7})",
+          R"({"op":{"op":"subscribe"}})",
+          R"({"op":"subscribe"})",
+          R"({"op":"subscribe","subscriptions":7})",
+          R"({"op":"subscribe","subscriptions":[7,null,[],{},{"id":1}]})",
+          R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
+          R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})",
+          R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
+          R"({"op":"subscribe","subscriptions":[{"id":1.5,"channelId":1}]})",
+          R"({"op":"subscribe","subscriptions":[{"id":7,"channelId":1}]})",
+          R"({"op":"unsubscribe","subscriptionIds":[99,"7",-7,null]})",
+          R"({"op":"unsubscribe","subscriptionIds":{"7":7}})",
+          "\xff\xfe",
+          R"({"op":"\u0000"})"})
+        viewed.session.receive(text);
+    viewed.session.receive(std::string(60000, '['));
+    while (const auto text = viewed.session.next_text(viewed.now))
+        CHECK(nlohmann::json::parse(*text)["op"] == "status");
+    viewed.publish(1);
+    CHECK(viewed.take() == std::vector<std::int64_t>{1});  // the first subscription is as it was
+}
