@@ -61,10 +61,11 @@ int serve(const Settings& settings) {
                              "give --token-file FILE, or only 127.0.0.1"},
                             EX_USAGE);
     LiveData data(settings.instance);
-    server->start({[&](const Request& request) { return respond(request, settings, data); },
-                   [&](boost::beast::tcp_stream& stream, Request request) {
-                       return serve_viewer(stream, std::move(request), settings, data);
-                   }});
+    server->start(
+        {[&](const Request& request) { return respond(request, settings, data); },
+         [&](boost::beast::tcp_stream stream, Request request, std::shared_ptr<void> place) {
+             serve_viewer(std::move(stream), std::move(request), settings, data, std::move(place));
+         }});
     boost::asio::steady_timer timer(context);
     turn_by_turn(timer, data);
     boost::asio::signal_set signals(context, SIGINT, SIGTERM);

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <utility>  // which awaitable.hpp of asio 1.74 forgets
+
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -55,10 +58,9 @@ struct Connections {
 class Place {
  public:
     explicit Place(std::shared_ptr<Connections> all) : all_(std::move(all)) { ++all_->count; }
-    Place(Place&& other) = default;
-    ~Place() {
-        if (all_) --all_->count;
-    }
+    Place(const Place&) = delete;
+    Place& operator=(const Place&) = delete;
+    ~Place() { --all_->count; }
 
     void wait(beast::tcp_stream& stream) { all_->waiting.push_back(&stream); }
     void go_on(beast::tcp_stream& stream) { all_->waiting.remove(&stream); }
@@ -67,7 +69,8 @@ class Place {
     std::shared_ptr<Connections> all_;
 };
 
-asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handlers handlers, Place place) {
+asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handlers handlers,
+                               std::shared_ptr<Place> place) {
     beast::flat_buffer buffer;
     for (bool again = true; again;) {
         http::request_parser<http::string_body> parser;
@@ -75,15 +78,15 @@ asio::awaitable<void> converse(beast::tcp_stream stream, Server::Handlers handle
         parser.body_limit(most_body_bytes);
         stream.expires_after(patience);
         beast::error_code error;
-        place.wait(stream);
+        place->wait(stream);
         co_await http::async_read(stream, buffer, parser, into(error));
-        place.go_on(stream);
+        place->go_on(stream);
         // Who speaks no HTTP is answered; who is gone, or says nothing, is not.
         if (error && error.category() != http::make_error_code({}).category()) break;
         if (error == http::error::end_of_stream || error == http::error::partial_message) break;
-        if (!error && beast::websocket::is_upgrade(parser.get()) && handlers.upgrade) {
-            co_await handlers.upgrade(stream, parser.release());
-            break;
+        if (!error && beast::websocket::is_upgrade(parser.get())) {
+            handlers.upgrade(std::move(stream), parser.release(), place);
+            co_return;
         }
         Response response = error ? refusal(parser.get(), http::status::bad_request,
                                             "no request: " + error.message())
@@ -112,10 +115,10 @@ asio::awaitable<void> accept(tcp::acceptor& acceptor, Server::Handlers handlers)
             timer.expires_after(pause);
             co_await timer.async_wait(into(error));
         } else if (connections->make_place()) {
-            asio::co_spawn(
-                acceptor.get_executor(),
-                converse(beast::tcp_stream(std::move(socket)), handlers, Place(connections)),
-                asio::detached);
+            asio::co_spawn(acceptor.get_executor(),
+                           converse(beast::tcp_stream(std::move(socket)), handlers,
+                                    std::make_shared<Place>(connections)),
+                           asio::detached);
         }
     }
 }
@@ -139,12 +142,12 @@ Expected<Server> Server::listen(asio::io_context& context, const std::string& ad
                        error == asio::error::address_in_use
                            ? "another program listens there: stop it, or give another --port"
                            : "give an address of this host as --address");
-    return Server(std::move(acceptor), acceptor.local_endpoint());
+    const tcp::endpoint bound = acceptor.local_endpoint();
+    return Server(std::move(acceptor), bound);
 }
 
-void Server::start(Handlers handlers) {
-    asio::co_spawn(acceptor_.get_executor(), accept(acceptor_, std::move(handlers)),
-                   asio::detached);
+void Server::start(const Handlers& handlers) {
+    asio::co_spawn(acceptor_.get_executor(), accept(acceptor_, handlers), asio::detached);
 }
 
 }  // namespace versavis::web

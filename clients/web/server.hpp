@@ -4,13 +4,11 @@
 // have been silent longest.
 #pragma once
 
-#include <utility>  // which asio 1.74 does not include by itself
-
-#include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "http.hpp"
@@ -22,8 +20,8 @@ class Server {
  public:
     struct Handlers {
         std::function<Response(const Request&)> respond;
-        /// Of a request for a WebSocket: what comes after it is the handler's.
-        std::function<boost::asio::awaitable<void>(boost::beast::tcp_stream&, Request)> upgrade{};
+        /// Takes a connection over that asks for a WebSocket; `place` is held until it ends.
+        std::function<void(boost::beast::tcp_stream, Request, std::shared_ptr<void> place)> upgrade;
     };
 
     /// Errors: no such address, or its port is in use.
@@ -33,7 +31,7 @@ class Server {
     boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
     /// From here on they answer, until the context stops.
-    void start(Handlers handlers);
+    void start(const Handlers& handlers);
 
  private:
     Server(boost::asio::ip::tcp::acceptor acceptor, boost::asio::ip::tcp::endpoint endpoint)

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "viewer.hpp"
 
+#include <utility>  // which awaitable.hpp of asio 1.74 forgets
+
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -78,10 +81,8 @@ asio::awaitable<void> send(std::shared_ptr<Connection> connection) {
     beast::get_lowest_layer(socket).close();
 }
 
-}  // namespace
-
-asio::awaitable<void> serve_viewer(beast::tcp_stream& stream, Request request,
-                                   const Settings& settings, LiveData& data) {
+asio::awaitable<void> serve(beast::tcp_stream stream, Request request, const Settings& settings,
+                            LiveData& data, [[maybe_unused]] std::shared_ptr<void> place) {
     beast::error_code error;
     if (const auto refused = refuse_viewer(request, settings)) {
         stream.expires_after(patience);
@@ -104,6 +105,16 @@ asio::awaitable<void> serve_viewer(beast::tcp_stream& stream, Request request,
     if (error) co_return;
     asio::co_spawn(socket.get_executor(), receive(connection), asio::detached);
     co_await send(connection);
+}
+
+}  // namespace
+
+void serve_viewer(beast::tcp_stream stream, Request request, const Settings& settings,
+                  LiveData& data, std::shared_ptr<void> place) {
+    const auto executor = stream.get_executor();
+    asio::co_spawn(executor,
+                   serve(std::move(stream), std::move(request), settings, data, std::move(place)),
+                   asio::detached);
 }
 
 }  // namespace versavis::web

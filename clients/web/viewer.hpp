@@ -2,10 +2,8 @@
 // The connection of a viewer that speaks Foxglove's protocol.
 #pragma once
 
-#include <utility>  // which asio 1.74 does not include by itself
-
-#include <boost/asio/awaitable.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
+#include <memory>
 
 #include "http.hpp"
 #include "live_data.hpp"
@@ -13,8 +11,9 @@
 
 namespace versavis::web {
 
-/// Answers the request for a WebSocket, and serves it until it ends.
-boost::asio::awaitable<void> serve_viewer(boost::beast::tcp_stream& stream, Request request,
-                                          const Settings& settings, LiveData& data);
+/// Answers the request for a WebSocket, and serves it, by the stream's executor, until it ends;
+/// `settings` and `data` are there as long. `place` is held until then.
+void serve_viewer(boost::beast::tcp_stream stream, Request request, const Settings& settings,
+                  LiveData& data, std::shared_ptr<void> place);
 
 }  // namespace versavis::web

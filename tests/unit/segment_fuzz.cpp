@@ -37,9 +37,7 @@ class FuzzVictim {
     }
 
     std::filesystem::path path() const { return directory_.path() / "victim"; }
-    std::string instance() const {
-        return test::instance_in(directory_.path());
-    }
+    std::string instance() const { return test::instance_in(directory_.path()); }
 
     void publish() {
         Metadata metadata;
