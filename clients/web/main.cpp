@@ -61,8 +61,9 @@ int serve(const Settings& settings) {
                              "give --token-file FILE, or only 127.0.0.1"},
                             EX_USAGE);
     LiveData data(settings.instance);
+    Recording recording(settings.instance, settings.record_to);
     server->start(
-        {[&](const Request& request) { return respond(request, settings, data); },
+        {[&](const Request& request) { return respond(request, settings, data, recording); },
          [&](boost::beast::tcp_stream stream, Request request, std::shared_ptr<void> place) {
              serve_viewer(std::move(stream), std::move(request), settings, data, std::move(place));
          }});
@@ -92,6 +93,9 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--port", settings.port, "To listen on; 0: any that is free")
         ->capture_default_str();
+    app.add_option("--record-to", settings.record_to,
+                   "Folder of recordings that are begun from the page; none: it has no button")
+        ->check(CLI::ExistingDirectory);
     app.add_option("--allow-origin", settings.origins,
                    "Whose pages may open WebSockets, as https://app.foxglove.dev");
     app.add_option("--token-file", token_file, "Whoever looks needs the token in this file");

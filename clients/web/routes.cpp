@@ -79,6 +79,36 @@ Response picture(const Request& request, const Target& target, LiveData& data) {
     return response;
 }
 
+/// Browsers name the origin of each POST; only this server's own page may change anything.
+bool from_own_page(const Request& request) {
+    const auto origin = request[http::field::origin];
+    const auto host = request[http::field::host];
+    const std::string_view named(origin.data(), origin.size());
+    return named.empty() ||
+           named.substr(named.find("//") + 2) == std::string_view(host.data(), host.size());
+}
+
+Response recording_facts(const Request& request, Recording& recording) {
+    return answer(request, http::status::ok, "application/json",
+                  recording.facts(host_now()).dump() + "\n");
+}
+
+Response record(const Request& request, const Target& target, Recording& recording) {
+    if (!from_own_page(request))
+        return refusal(request, http::status::forbidden, "only this server's own page records");
+    if (!recording.possible())
+        return refusal(request, http::status::forbidden,
+                       "this server does not record; --record-to DIRECTORY lets it");
+    const auto found = target.query.find("action");
+    const std::string action = found == target.query.end() ? "" : found->second;
+    if (action != "begin" && action != "end")
+        return refusal(request, http::status::bad_request, "'action' is begin or end");
+    const auto done =
+        action == "begin" ? recording.begin(host_now(), std::time(nullptr)) : recording.end();
+    if (!done) return refusal(request, http::status::conflict, done.error().message());
+    return recording_facts(request, recording);
+}
+
 /// None: not a file of the page.
 std::optional<Response> page_file(const Request& request, const std::string& path) {
     const auto file = [&](std::string_view type, std::string_view content) {
@@ -114,11 +144,15 @@ std::optional<Response> refuse_viewer(const Request& request, const Settings& se
     return std::nullopt;
 }
 
-Response respond(const Request& request, const Settings& settings, LiveData& data) {
+Response respond(const Request& request, const Settings& settings, LiveData& data,
+                 Recording& recording) {
     const auto text = request.target();
     const auto target = parse_target({text.data(), text.size()});
     if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
     if (auto refused = refuse(request, *target, settings)) return std::move(*refused);
+    if (target->path == "/api/record")
+        return request.method() == http::verb::post ? record(request, *target, recording)
+                                                    : recording_facts(request, recording);
     if (request.method() != http::verb::get && request.method() != http::verb::head) {
         Response response = refusal(request, http::status::method_not_allowed, "use GET");
         response.set(http::field::allow, "GET, HEAD");

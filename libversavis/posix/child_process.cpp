@@ -54,6 +54,17 @@ ChildProcess::~ChildProcess() {
     wait();
 }
 
+void ChildProcess::send(int signal) const {
+    if (pid_ > 0) ::kill(pid_, signal);
+}
+
+bool ChildProcess::ended() const {
+    siginfo_t state{};
+    return pid_ < 0 ||
+           (::waitid(P_PID, static_cast<id_t>(pid_), &state, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+            state.si_pid == pid_);
+}
+
 int ChildProcess::wait() {
     int status = 0;
     ::waitpid(std::exchange(pid_, -1), &status, 0);

@@ -26,6 +26,11 @@ class ChildProcess {
     /// A stream whose other end is its standard input and output.
     int socket() const { return socket_.get(); }
 
+    void send(int signal) const;
+
+    /// Whether there is nothing left but its status, for wait().
+    bool ended() const;
+
     /// Waits for its end; the status is that of waitpid().
     int wait();
 

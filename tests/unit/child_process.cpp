@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <cerrno>
@@ -27,9 +28,11 @@ TEST_CASE("child_process: reads and writes one socket, and its end is known") {
                                     ChildProcess::Errors::dropped);
     REQUIRE(echo);
     REQUIRE(::send(echo->socket(), "text", 4, MSG_NOSIGNAL) == 4);
+    CHECK_FALSE(echo->ended());
     ::shutdown(echo->socket(), SHUT_WR);
     CHECK(received(*echo) == "text");
     const int status = echo->wait();
+    CHECK(echo->ended());
     CHECK(WIFEXITED(status));
     CHECK(WEXITSTATUS(status) == 7);
 }
@@ -46,6 +49,18 @@ TEST_CASE("child_process: does not outlive its owner, wherever that was moved") 
     owner.reset();
     CHECK(::kill(pid, 0) != 0);
     CHECK(errno == ESRCH);
+}
+
+TEST_CASE("child_process: takes signals, and its end is seen before it is waited for") {
+    auto process = ChildProcess::start({"sleep", "60"}, ChildProcess::Errors::inherited);
+    REQUIRE(process);
+    process->send(SIGTERM);
+    CHECK(received(*process).empty());  // until its end
+    while (!process->ended()) ::usleep(1000);
+    const int status = process->wait();
+    CHECK(WIFSIGNALED(status));
+    CHECK(WTERMSIG(status) == SIGTERM);
+    process->send(SIGTERM);  // to nobody
 }
 
 TEST_CASE("child_process: a program that is not there is an error") {

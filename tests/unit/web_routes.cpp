@@ -3,6 +3,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "../support/temporary_directory.hpp"
+
 using namespace versavis;
 using namespace versavis::web;
 
@@ -17,8 +19,11 @@ Request get(const std::string& target, const std::string& host = "localhost:8765
 struct Site {
     Settings settings{"nobody", "127.0.0.1", 8765, ""};
     LiveData data{"nobody"};
+    Recording recording{"nobody", ""};
 
-    Response operator()(const Request& request) { return respond(request, settings, data); }
+    Response operator()(const Request& request) {
+        return respond(request, settings, data, recording);
+    }
     unsigned status(const Request& request) { return (*this)(request).result_int(); }
 };
 
@@ -98,4 +103,26 @@ TEST_CASE("web_routes: with a token, nobody gets anything without it") {
     CHECK(site.status(request) == 200);
     request.set(http::field::authorization, "Basic 0123456789abcdef");
     CHECK(site.status(request) == 401);
+}
+
+TEST_CASE("web_routes: recordings are begun and ended by the own page alone") {
+    const test::TemporaryDirectory directory;
+    Site site;
+    Request post = get("/api/record?action=begin");
+    post.method(http::verb::post);
+    CHECK(site.status(post) == 403);  // it has no folder
+    CHECK_FALSE(nlohmann::json::parse(site(get("/api/record")).body())["possible"].get<bool>());
+    Recording recording{"nobody", directory.path()};
+    const auto status = [&](const std::string& target, const std::string& origin) {
+        Request request = get(target);
+        request.method(http::verb::post);
+        if (!origin.empty()) request.set(http::field::origin, origin);
+        return respond(request, site.settings, site.data, recording).result_int();
+    };
+    for (const char* origin : {"http://other.example.org", "http://localhost", "null", "//",
+                               "http://localhost:8765.example.org"})
+        CHECK(status("/api/record?action=begin", origin) == 403);
+    CHECK(status("/api/record?action=", "") == 400);
+    CHECK(status("/api/record", "") == 400);
+    CHECK(status("/api/record?action=end", "http://localhost:8765") == 409);
 }

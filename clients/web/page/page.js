@@ -416,6 +416,45 @@ function update_events(state) {
             event.reason === "none" ? "" : words(event.reason), event.value, `${event.epoch}`]));
 }
 
+/** The button, and what became of the recording. */
+const recording = {
+    running: false,
+
+    show(facts) {
+        by_id("recording").hidden = !facts.possible;
+        this.running = facts.running;
+        set_text(by_id("record"), facts.running ? "Stop recording" : "Record");
+        const size = `${duration(facts.seconds)}, ${(facts.bytes / 1e6).toFixed(1)} MB`;
+        if (facts.running) this.say(`recording for ${size}, to ${facts.file}`);
+        else if (facts.problem) this.say(facts.problem);
+        else if (facts.report)
+            this.say(`${facts.file}: ${size}, ${facts.report.lost} items lost` +
+                (facts.report.stopped_early ? `; ${facts.report.stopped_early}` : ""));
+    },
+
+    say(text) {
+        set_text(by_id("recording-text"), text);
+    },
+
+    async ask(method, query = "") {
+        const answer = await fetch(`/api/record${query}`, {method});
+        const facts = await answer.json();
+        if (answer.ok) this.show(facts);
+        else this.say(facts.error);
+    },
+
+    async look() {
+        if (!document.hidden) await this.ask("GET").catch(() => {});
+        setTimeout(() => this.look(), retry_period_ms);
+    },
+
+    start() {
+        by_id("record").onclick = () => this.ask("POST",
+            `?action=${this.running ? "end" : "begin"}`).catch((error) => this.say(error.message));
+        this.look();
+    },
+};
+
 function update(state) {
     set_text(by_id("instance"), state.instance);
     document.title = `${state.instance}: ${state.conclusion.state} - VersaVIS`;
@@ -451,4 +490,5 @@ async function look() {
 }
 
 zoom.start();
+recording.start();
 look();
