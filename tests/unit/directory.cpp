@@ -80,9 +80,9 @@ class Heartbeat {
  public:
     explicit Heartbeat(Header& header)
         : thread_([this, &header] {
-              while (!stop_) {
-                  header.heartbeat_ns.fetch_add(50'000'000);
+              while (!stop_) {  // it is never ahead of the clock, as no writer's is
                   std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                  header.heartbeat_ns.fetch_add(50'000'000);
               }
           }) {}
     ~Heartbeat() {
