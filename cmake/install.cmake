@@ -9,6 +9,10 @@ install(DIRECTORY daemon/settings/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/v
 # Only where there is a compiler for the chip.
 install(FILES ${CMAKE_BINARY_DIR}/firmware/versavis.uf2
     DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis OPTIONAL)
+if(TARGET versavis-dds)
+    set(dds_unit versavis-dds.service.in:systemd/system/versavis-dds.service)
+    install(TARGETS versavis-dds RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
 if(TARGET versavis-rig)
     install(TARGETS versavis-rig RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
     install(DIRECTORY clients/rig/scenarios clients/rig/models
@@ -40,9 +44,11 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
 find_program(scdoc scdoc)
 find_program(python python3)
 set(programs versavisd versavis_tool versavis-web)
-if(TARGET versavis-rig)
-    list(APPEND programs versavis-rig)
-endif()
+foreach(program versavis-dds versavis-rig)
+    if(TARGET ${program})
+        list(APPEND programs ${program})
+    endif()
+endforeach()
 if(python)
     set(completion ${CMAKE_BINARY_DIR}/completion)
     add_custom_command(OUTPUT ${completion}/.made
@@ -89,5 +95,6 @@ install(CODE "
     set(system_directory \"${VERSAVIS_SYSTEM_DIR}\")
     set(sysconfdir \"${VERSAVIS_SYSCONFDIR}\")
     set(bindir \"${CMAKE_INSTALL_BINDIR}\")
-    set(docdir \"${CMAKE_INSTALL_DOCDIR}\")")
+    set(docdir \"${CMAKE_INSTALL_DOCDIR}\")
+    set(dds_unit \"${dds_unit}\")")
 install(SCRIPT cmake/install_service.cmake)

@@ -34,6 +34,7 @@ foreach(pair
         versavis-metrics.service.in:systemd/system/versavis-metrics.service
         versavis-verify.service.in:systemd/system/versavis-verify.service
         versavis-web.service.in:systemd/system/versavis-web.service
+        ${dds_unit}
         versavis-metrics.timer:systemd/system/versavis-metrics.timer
         60-versavis.rules:udev/rules.d/60-versavis.rules
         versavis.catalog:systemd/catalog/versavis.catalog

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// versavis-dds: what the service publishes, as topics of ROS 2 on other hosts.
+#include <fmt/format.h>
+#include <signal.h>
+#include <sysexits.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+
+#include "base/fail.hpp"
+#include "bridge.hpp"
+#include "versavis/ring_path.hpp"
+
+namespace {
+
+using namespace versavis;
+using namespace versavis::dds;
+
+volatile sig_atomic_t stop_requested = 0;
+
+/// ROS 2's default is 0.
+std::uint32_t default_domain() {
+    const char* named = std::getenv("ROS_DOMAIN_ID");
+    return named == nullptr ? 0 : static_cast<std::uint32_t>(std::strtoul(named, nullptr, 10));
+}
+
+int serve(const std::string& instance, const std::string& prefix, const NetworkSettings& network) {
+    const auto participant = Participant::create(network);
+    if (!participant) return client::fail(participant.error());
+    Bridge bridge(*participant, instance, prefix);
+    fmt::print("publishing instance '{}' in domain {}\n", instance, network.domain);
+    std::fflush(stdout);
+    for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
+    while (stop_requested == 0)
+        if (const auto done = bridge.turn(milliseconds(100)); !done)
+            return client::fail(done.error());
+    const BridgeCounts& counts = bridge.counts();
+    fmt::print("{} messages sent, {} frames overtaken, {} items lost\n", counts.sent,
+               counts.overtaken, counts.lost);
+    return EX_OK;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"Publishes what the service publishes as topics of ROS 2, by DDS."};
+    app.set_version_flag("--version", "versavis-dds " VERSAVIS_VERSION);
+    std::string instance = default_instance();
+    std::string prefix;
+    NetworkSettings network;
+    network.domain = default_domain();
+    app.add_option("--instance", instance, "Of the service")->capture_default_str();
+    app.add_option("--prefix", prefix, "In front of all topics but /diagnostics, as /car");
+    app.add_option("--domain", network.domain, "Of DDS, as $ROS_DOMAIN_ID")->capture_default_str();
+    app.add_option("--interface", network.interfaces,
+                   "Network interface, by name or address; may be repeated")
+        ->allow_extra_args(false);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? EX_OK : EX_USAGE;
+    }
+    return serve(instance, prefix, network);
+}
