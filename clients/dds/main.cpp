@@ -5,7 +5,7 @@
 #include <sysexits.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdlib>
+#include <cstdio>
 
 #include "base/fail.hpp"
 #include "bridge.hpp"
@@ -17,12 +17,6 @@ using namespace versavis;
 using namespace versavis::dds;
 
 volatile sig_atomic_t stop_requested = 0;
-
-/// ROS 2's default is 0.
-std::uint32_t default_domain() {
-    const char* named = std::getenv("ROS_DOMAIN_ID");
-    return named == nullptr ? 0 : static_cast<std::uint32_t>(std::strtoul(named, nullptr, 10));
-}
 
 int serve(const std::string& instance, const std::string& prefix, const NetworkSettings& network) {
     const auto participant = Participant::create(network);
@@ -48,10 +42,11 @@ int main(int argc, char** argv) {
     std::string instance = default_instance();
     std::string prefix;
     NetworkSettings network;
-    network.domain = default_domain();
     app.add_option("--instance", instance, "Of the service")->capture_default_str();
     app.add_option("--prefix", prefix, "In front of all topics but /diagnostics, as /car");
-    app.add_option("--domain", network.domain, "Of DDS, as $ROS_DOMAIN_ID")->capture_default_str();
+    app.add_option("--domain", network.domain, "Of DDS, as ROS 2 has it")
+        ->capture_default_str()
+        ->envname("ROS_DOMAIN_ID");
     app.add_option("--interface", network.interfaces,
                    "Network interface, by name or address; may be repeated")
         ->allow_extra_args(false);

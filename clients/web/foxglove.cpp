@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/shallow_json.hpp"
+#include "http.hpp"
 #include "recording/item_messages.hpp"
 #include "recording/ros_messages.hpp"
 
@@ -22,6 +23,8 @@ constexpr Duration look_period = seconds(1);
 constexpr Duration report_period = seconds(5);
 /// A viewer has some dozen panels.
 constexpr std::size_t most_subscriptions = 256;
+/// That wait for a viewer, which may send nonsense and read nothing.
+constexpr std::size_t most_texts = 1000;
 constexpr int information = 0;
 constexpr int warning = 1;
 
@@ -75,6 +78,7 @@ FoxgloveSession::FoxgloveSession(std::string instance, LiveData& data)
 }
 
 void FoxgloveSession::report(int level, const std::string& message) {
+    if (texts_.size() >= most_texts) return;
     texts_.push_back({{"op", "status"}, {"level", level}, {"message", message}});
 }
 
@@ -187,7 +191,7 @@ std::optional<std::string> FoxgloveSession::next_text(HostTime now) {
     }
     report_missed(now);
     if (texts_.empty()) return std::nullopt;
-    const std::string text = texts_.front().dump(-1, ' ', false, json::error_handler_t::replace);
+    const std::string text = dumped(texts_.front());
     texts_.pop_front();
     return text;
 }

@@ -3,7 +3,6 @@
 
 #include <boost/asio/ip/address.hpp>
 #include <charconv>
-#include <nlohmann/json.hpp>
 
 namespace versavis::web {
 
@@ -102,11 +101,13 @@ Response answer(const Request& request, http::status status, std::string_view ty
     return response;
 }
 
+std::string dumped(const nlohmann::json& document) {
+    return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 Response refusal(const Request& request, http::status status, const std::string& why) {
     return answer(request, status, "application/json",
-                  nlohmann::json{{"error", why}}.dump(-1, ' ', false,
-                                                      nlohmann::json::error_handler_t::replace) +
-                      "\n");
+                  dumped(nlohmann::json{{"error", why}}) + "\n");
 }
 
 }  // namespace versavis::web

@@ -5,6 +5,7 @@
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -37,6 +38,9 @@ bool names_loopback(std::string_view host);
 
 Response answer(const Request& request, http::status status, std::string_view type,
                 std::string body);
+
+/// Whatever bytes its texts have.
+std::string dumped(const nlohmann::json& document);
 
 /// {"error": ...}
 Response refusal(const Request& request, http::status status, const std::string& why);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "doctor/service_checks.hpp"
+#include "http.hpp"
 #include "status/status_document.hpp"
 #include "status/status_metrics.hpp"
 
@@ -73,12 +74,10 @@ json facts_of(const Frame& frame, const Picture& picture) {
             {"histogram", picture.histogram}};
 }
 
-/// The state of a clock that a plot shows, of a status document.
+/// What a plot shows of a clock, of a status document.
 json clock_facts(const json& clock) {
     json facts = json::object();
-    for (const char* key : {"state", "sigma_ns", "bound_ns", "skew_ppm", "residual_ns"})
-        facts[key] = clock.value(key, json());
-    facts["output_minus_host_ns"] = exact(clock.value("output_minus_host_ns", std::int64_t{0}));
+    for (const char* key : {"sigma_ns", "bound_ns"}) facts[key] = clock.value(key, json());
     return facts;
 }
 
@@ -169,8 +168,9 @@ void LiveData::read_status(HostTime now) {
     auto status = client::read_status(instance_);
     silence_ = status ? "" : client::explain_silence(status.error()).message();
     status_ = status ? std::optional(std::move(*status)) : std::nullopt;
-    if (status_ && status_->contains("clock"))
-        clock_.push_back({now, clock_facts((*status_)["clock"])});
+    if (!status_) return;
+    if (const auto clock = status_->find("clock"); clock != status_->end() && clock->is_object())
+        clock_.push_back({now, clock_facts(*clock)});
     forget(clock_, now - clock_kept);
 }
 
@@ -249,7 +249,7 @@ void LiveData::watch(HostTime now) {
 const std::string& LiveData::state(HostTime now) {
     watch(now);
     if (!state_.empty() && now - stated_ < state_period) return state_;
-    state_ = document(now).dump(-1, ' ', false, json::error_handler_t::replace);
+    state_ = dumped(document(now));
     stated_ = now;
     return state_;
 }

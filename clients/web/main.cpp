@@ -61,7 +61,7 @@ int serve(const Settings& settings) {
                              "give --token-file FILE, or only 127.0.0.1"},
                             EX_USAGE);
     LiveData data(settings.instance);
-    Recording recording(settings.instance, settings.record_to);
+    RecordingProcess recording(settings.instance, settings.record_to);
     server->start(
         {[&](const Request& request) { return respond(request, settings, data, recording); },
          [&](boost::beast::tcp_stream stream, Request request, std::shared_ptr<void> place) {

@@ -88,12 +88,12 @@ bool from_own_page(const Request& request) {
            named.substr(named.find("//") + 2) == std::string_view(host.data(), host.size());
 }
 
-Response recording_facts(const Request& request, Recording& recording) {
+Response recording_facts(const Request& request, RecordingProcess& recording) {
     return answer(request, http::status::ok, "application/json",
-                  recording.facts(host_now()).dump() + "\n");
+                  dumped(recording.facts(host_now())) + "\n");
 }
 
-Response record(const Request& request, const Target& target, Recording& recording) {
+Response record(const Request& request, const Target& target, RecordingProcess& recording) {
     if (!from_own_page(request))
         return refusal(request, http::status::forbidden, "only this server's own page records");
     if (!recording.possible())
@@ -121,6 +121,31 @@ std::optional<Response> page_file(const Request& request, const std::string& pat
     return std::nullopt;
 }
 
+Response route(const Request& request, const Settings& settings, LiveData& data,
+               RecordingProcess& recording) {
+    const auto text = request.target();
+    const auto target = parse_target({text.data(), text.size()});
+    if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
+    if (auto refused = refuse(request, *target, settings)) return std::move(*refused);
+    if (target->path == "/api/record")
+        return request.method() == http::verb::post ? record(request, *target, recording)
+                                                    : recording_facts(request, recording);
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+        Response response = refusal(request, http::status::method_not_allowed, "use GET");
+        response.set(http::field::allow, "GET, HEAD");
+        return response;
+    }
+    if (auto file = page_file(request, target->path)) return std::move(*file);
+    if (target->path == "/api/state")
+        return answer(request, http::status::ok, "application/json", data.state(host_now()));
+    if (target->path == "/metrics")
+        return answer(request, http::status::ok,
+                      "application/openmetrics-text; version=1.0.0; charset=utf-8",
+                      data.metrics(host_now()));
+    if (target->path.starts_with(picture_path)) return picture(request, *target, data);
+    return refusal(request, http::status::not_found, "there is no " + target->path);
+}
+
 }  // namespace
 
 std::optional<Response> refuse_viewer(const Request& request, const Settings& settings) {
@@ -145,28 +170,14 @@ std::optional<Response> refuse_viewer(const Request& request, const Settings& se
 }
 
 Response respond(const Request& request, const Settings& settings, LiveData& data,
-                 Recording& recording) {
-    const auto text = request.target();
-    const auto target = parse_target({text.data(), text.size()});
-    if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
-    if (auto refused = refuse(request, *target, settings)) return std::move(*refused);
-    if (target->path == "/api/record")
-        return request.method() == http::verb::post ? record(request, *target, recording)
-                                                    : recording_facts(request, recording);
-    if (request.method() != http::verb::get && request.method() != http::verb::head) {
-        Response response = refusal(request, http::status::method_not_allowed, "use GET");
-        response.set(http::field::allow, "GET, HEAD");
-        return response;
+                 RecordingProcess& recording) {
+    try {
+        return route(request, settings, data, recording);
+    } catch (const nlohmann::json::exception& error) {
+        return refusal(request, http::status::internal_server_error,
+                       std::string("the service's status is not understood: ") + error.what() +
+                           "; install service and clients of the same release");
     }
-    if (auto file = page_file(request, target->path)) return std::move(*file);
-    if (target->path == "/api/state")
-        return answer(request, http::status::ok, "application/json", data.state(host_now()));
-    if (target->path == "/metrics")
-        return answer(request, http::status::ok,
-                      "application/openmetrics-text; version=1.0.0; charset=utf-8",
-                      data.metrics(host_now()));
-    if (target->path.starts_with(picture_path)) return picture(request, *target, data);
-    return refusal(request, http::status::not_found, "there is no " + target->path);
 }
 
 }  // namespace versavis::web

@@ -4,13 +4,13 @@
 
 #include "http.hpp"
 #include "live_data.hpp"
-#include "recording.hpp"
+#include "recording_process.hpp"
 #include "settings.hpp"
 
 namespace versavis::web {
 
 Response respond(const Request& request, const Settings& settings, LiveData& data,
-                 Recording& recording);
+                 RecordingProcess& recording);
 
 /// Why a request for a WebSocket is not granted; none: it is. Pages of other origins may open
 /// sockets, unlike other requests: only those of `settings` may.

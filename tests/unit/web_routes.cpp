@@ -2,8 +2,10 @@
 #include "routes.hpp"
 
 #include <catch2/catch.hpp>
+#include <cstring>
 
 #include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
 
 using namespace versavis;
 using namespace versavis::web;
@@ -19,7 +21,7 @@ Request get(const std::string& target, const std::string& host = "localhost:8765
 struct Site {
     Settings settings{"nobody", "127.0.0.1", 8765, ""};
     LiveData data{"nobody"};
-    Recording recording{"nobody", ""};
+    RecordingProcess recording{"nobody", ""};
 
     Response operator()(const Request& request) {
         return respond(request, settings, data, recording);
@@ -112,7 +114,7 @@ TEST_CASE("web_routes: recordings are begun and ended by the own page alone") {
     post.method(http::verb::post);
     CHECK(site.status(post) == 403);  // it has no folder
     CHECK_FALSE(nlohmann::json::parse(site(get("/api/record")).body())["possible"].get<bool>());
-    Recording recording{"nobody", directory.path()};
+    RecordingProcess recording{"nobody", directory.path()};
     const auto status = [&](const std::string& target, const std::string& origin) {
         Request request = get(target);
         request.method(http::verb::post);
@@ -125,4 +127,30 @@ TEST_CASE("web_routes: recordings are begun and ended by the own page alone") {
     CHECK(status("/api/record?action=", "") == 400);
     CHECK(status("/api/record", "") == 400);
     CHECK(status("/api/record?action=end", "http://localhost:8765") == 409);
+}
+
+TEST_CASE("web_routes: a status document of other types is an error, not an end") {
+    const test::TemporaryDirectory directory("/dev/shm");
+    const std::string instance = test::instance_in(directory.path());
+    auto status =
+        *ring::Writer::create(directory.path(), {"status", ring::StreamKind::status, 8, 2, 4096});
+    const auto publish = [&](const std::string& document) {
+        const auto slot = status.acquire();
+        REQUIRE(slot);
+        std::memcpy(status.slot_data(*slot), document.data(), document.size());
+        status.publish(*slot, static_cast<std::uint32_t>(document.size()), OutputTime{1}, {});
+    };
+    for (const char* members :
+         {R"("clock": 7)", R"("clock": {"sigma_ns": "x", "health": 7})", R"("cameras": {"a": 1})",
+          R"("cameras": [7], "health": [])", R"("board": [[]], "imus": [{"name": {}}])"}) {
+        publish(std::string(R"({"schema": 1, )") + members + "}");
+        Site site;
+        site.settings.instance = instance;
+        site.data = LiveData(instance);
+        site.data.advance(host_now());
+        const Response response = site(get("/api/state"));
+        CHECK((response.result_int() == 200 || response.result_int() == 500));
+        CHECK_FALSE(nlohmann::json::parse(response.body()).empty());
+        site.data.advance(host_now() + seconds(1));
+    }
 }

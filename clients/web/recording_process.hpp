@@ -13,14 +13,14 @@
 
 namespace versavis::web {
 
-class Recording {
+class RecordingProcess {
  public:
     /// `directory`: where files go; empty: nothing is recorded.
-    Recording(std::string instance, std::string directory)
+    RecordingProcess(std::string instance, std::string directory)
         : instance_(std::move(instance)), directory_(std::move(directory)) {}
-    Recording(const Recording&) = delete;
-    Recording& operator=(const Recording&) = delete;
-    ~Recording();  ///< ends it; the file is complete
+    RecordingProcess(const RecordingProcess&) = delete;
+    RecordingProcess& operator=(const RecordingProcess&) = delete;
+    ~RecordingProcess();  ///< ends it; the file is complete
 
     bool possible() const { return !directory_.empty(); }
 

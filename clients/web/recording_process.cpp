@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recording.hpp"
+#include "recording_process.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -35,13 +35,13 @@ std::string output_of(const ChildProcess& process) {
 
 }  // namespace
 
-Recording::~Recording() {
+RecordingProcess::~RecordingProcess() {
     if (!process_) return;
     process_->send(SIGTERM);
     process_->wait();
 }
 
-Expected<> Recording::begin(HostTime now, std::time_t date) {
+Expected<> RecordingProcess::begin(HostTime now, std::time_t date) {
     look(now);
     if (process_) return failure(file_, "is being recorded already", "end it first");
     file_ = fmt::format("{}/versavis-{:%Y%m%d-%H%M%S}.mcap", directory_, fmt::localtime(date));
@@ -56,13 +56,13 @@ Expected<> Recording::begin(HostTime now, std::time_t date) {
     return {};
 }
 
-Expected<> Recording::end() {
+Expected<> RecordingProcess::end() {
     if (!process_) return failure("recording", "none is running", "begin one first");
     process_->send(SIGTERM);
     return {};
 }
 
-void Recording::look(HostTime now) {
+void RecordingProcess::look(HostTime now) {
     if (!process_) return;
     if (!process_->ended()) return;
     ended_ = now;
@@ -73,7 +73,7 @@ void Recording::look(HostTime now) {
     problem_ = file_ + ": nothing was recorded; the log of versavis-web says why";
 }
 
-nlohmann::json Recording::facts(HostTime now) {
+nlohmann::json RecordingProcess::facts(HostTime now) {
     look(now);
     std::error_code error;
     const auto bytes = std::filesystem::file_size(file_, error);
