@@ -128,7 +128,9 @@ void FoxgloveSession::subscribe(const json& subscriptions) {
         const auto channel_id = number_of(wanted, "channelId");
         const auto found = channel_id ? channels_.find(*channel_id) : channels_.end();
         if (!id || found == channels_.end()) {
-            report(warning, "there is no such channel: " + wanted.dump());
+            report(warning,
+                   "a subscription needs an 'id' and the 'channelId' of a channel that "
+                   "was advertised");
             continue;
         }
         if (subscriptions_.count(*id) != 0 || subscriptions_.size() >= most_subscriptions) {
@@ -170,7 +172,7 @@ void FoxgloveSession::receive(std::string_view text) {
             if (const auto number = number_of({{"id", id}}, "id")) subscriptions_.erase(*number);
         return;
     }
-    report(information, "not supported: " + operation.dump());
+    report(information, "only 'subscribe' and 'unsubscribe' are supported");
 }
 
 void FoxgloveSession::report_missed(HostTime now) {
@@ -178,7 +180,7 @@ void FoxgloveSession::report_missed(HostTime now) {
     reported_ = now;
     for (auto& [id, subscription] : subscriptions_) {
         if (subscription.missed == 0) continue;
-        report(warning, fmt::format("{}: {} messages were not sent, as the connection is slow",
+        report(warning, fmt::format("{}: {} messages were not sent, as newer ones had come",
                                     subscription.channel->topic, subscription.missed));
         subscription.missed = 0;
     }
@@ -202,8 +204,11 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
     const std::string& stream = channel.stream;
     if (channel.content == Content::jpeg) {
         const ShownPicture* shown = data_->picture(stream, true, now);
-        if (shown == nullptr || shown->version == subscription.version || !shown->problem.empty())
-            return std::nullopt;
+        if (shown == nullptr) return std::nullopt;
+        if (shown->problem != subscription.problem && !shown->problem.empty())
+            report(warning, shown->problem);
+        subscription.problem = shown->problem;
+        if (!shown->problem.empty() || shown->version == subscription.version) return std::nullopt;
         subscription.version = shown->version;
         const auto length = static_cast<std::uint32_t>(shown->jpeg.size());
         return message_head(id, shown->time) +

@@ -50,6 +50,7 @@ class FoxgloveSession {
         Reader reader;
         std::uint64_t number = 0;   ///< of the frame that was sent last, and 1
         std::uint64_t version = 0;  ///< of the JPEG
+        std::string problem{};      ///< why there is none, as it was reported
         std::uint64_t missed = 0;
     };
 

@@ -28,8 +28,6 @@ std::optional<std::string> unescaped(std::string_view text) {
     return made;
 }
 
-std::string_view as_view(boost::beast::string_view text) { return {text.data(), text.size()}; }
-
 }  // namespace
 
 std::optional<Target> parse_target(std::string_view target) {

@@ -16,6 +16,10 @@ namespace http = boost::beast::http;
 using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
+inline std::string_view as_view(boost::beast::string_view text) {
+    return {text.data(), text.size()};
+}
+
 /// A target without its escapes: `/api/picture/cam0?after=3`.
 struct Target {
     std::string path;

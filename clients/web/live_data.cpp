@@ -34,9 +34,7 @@ constexpr int items_per_turn = 4000;
 /// Pixels; a page shows two cameras side by side on a usual screen.
 constexpr std::uint32_t overview_width = 800;
 
-double seconds_before(HostTime now, HostTime then) {
-    return static_cast<double>((then - now).ns) * 1e-9;
-}
+double age_s(HostTime now, HostTime then) { return static_cast<double>((now - then).ns) * 1e-9; }
 
 /// JavaScript's numbers are exact up to 2^53 only.
 json exact(std::int64_t value) { return std::to_string(value); }
@@ -44,6 +42,16 @@ json exact(std::int64_t value) { return std::to_string(value); }
 template <class Items>
 void forget(Items& items, HostTime before) {
     while (!items.empty() && items.front().time < before) items.pop_front();
+}
+
+/// Gives each item that has come to `take`; those that were overwritten are passed over.
+template <class Stream, class Take>
+void read_all(Stream& stream, Take take) {
+    for (int i = 0; i < items_per_turn; ++i)
+        if (const auto item = stream.next())
+            take(*item);
+        else if (item.error().why == Pause::nothing || item.error().why == Pause::gone)
+            return;
 }
 
 json sigma_of(std::uint32_t sigma_ns) {
@@ -108,70 +116,55 @@ void LiveData::look_for_streams() {
 }
 
 void LiveData::read_frames(Camera& camera, HostTime now) {
-    for (int i = 0; i < items_per_turn; ++i) {
-        const auto frame = camera.frames.next();
-        if (!frame) {
-            if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
-            continue;
-        }
+    read_all(camera.frames, [&](const Frame& frame) {
         camera.exposures.push_back(
-            {frame->data.host_time,
-             {{"tick", frame->data.tick()},
-              {"exposure_s", static_cast<double>(frame->data.exposure.ns) * 1e-9},
-              {"kind", to_string(frame->data.stamp_kind())},
-              {"sigma_ns", sigma_of(frame->data.sigma_ns)},
-              {"suspect", (frame->data.flags & flag_suspect) != 0}}});
-    }
-    while (!camera.exposures.empty() && camera.exposures.front().middle < now - exposures_kept)
-        camera.exposures.pop_front();
+            {frame.data.host_time,
+             {{"tick", frame.data.tick()},
+              {"exposure_s", static_cast<double>(frame.data.exposure.ns) * 1e-9},
+              {"kind", to_string(frame.data.stamp_kind())},
+              {"sigma_ns", sigma_of(frame.data.sigma_ns)},
+              {"suspect", (frame.data.flags & flag_suspect) != 0}}});
+    });
+    forget(camera.exposures, now - exposures_kept);
 }
 
 void LiveData::read_samples(Imu& imu, HostTime now) {
-    for (int i = 0; i < items_per_turn; ++i) {
-        const auto sample = imu.samples.next();
-        if (!sample) {
-            if (sample.error().why == Pause::nothing || sample.error().why == Pause::gone) break;
-            continue;
-        }
-        const ImuMetadata& data = sample->data;
-        if (!imu.shown.empty() && data.host_time - imu.shown.back().time < sample_spacing) continue;
+    read_all(imu.samples, [&](const ImuSample& sample) {
+        const ImuMetadata& data = sample.data;
+        if (!imu.shown.empty() && data.host_time - imu.shown.back().time < sample_spacing) return;
         imu.shown.push_back({data.host_time,
                              {data.gyro[0], data.gyro[1], data.gyro[2], data.accel[0],
                               data.accel[1], data.accel[2]}});
-    }
+    });
     forget(imu.shown, now - samples_kept);
 }
 
 void LiveData::read_events() {
-    for (int i = 0; event_stream_ && i < items_per_turn; ++i) {
-        const auto event = event_stream_->next();
-        if (!event) {
-            if (event.error().why == Pause::nothing || event.error().why == Pause::gone) break;
-            continue;
-        }
-        const std::string source = event->data.source_name;
-        const char* reason = to_string(event->data.reason);
-        events_.push_back({event->data.host_time,
-                           {{"kind", to_string(event->data.kind)},
+    if (!event_stream_) return;
+    read_all(*event_stream_, [&](const Event& event) {
+        const std::string source = event.data.source_name;
+        const char* reason = to_string(event.data.reason);
+        events_.push_back({event.data.host_time,
+                           {{"kind", to_string(event.data.kind)},
                             {"source", source},
                             {"reason", reason},
-                            {"value", exact(event->data.value)},
-                            {"epoch", event->data.epoch}}});
+                            {"value", exact(event.data.value)},
+                            {"epoch", event.data.epoch}}});
         if (events_.size() > events_kept) events_.pop_front();
         const auto camera = cameras_.find(source);
-        if (event->data.kind == EventKind::frame_without_trigger && camera != cameras_.end())
+        if (event.data.kind == EventKind::frame_without_trigger && camera != cameras_.end())
             ++camera->second.withheld[reason];
-    }
+    });
 }
 
 void LiveData::read_status(HostTime now) {
     auto status = client::read_status(instance_);
     silence_ = status ? "" : client::explain_silence(status.error()).message();
     status_ = status ? std::optional(std::move(*status)) : std::nullopt;
+    forget(clock_, now - clock_kept);
     if (!status_) return;
     if (const auto clock = status_->find("clock"); clock != status_->end() && clock->is_object())
         clock_.push_back({now, clock_facts(*clock)});
-    forget(clock_, now - clock_kept);
 }
 
 void LiveData::advance(HostTime now) {
@@ -198,36 +191,30 @@ json LiveData::document(HostTime now) const {
     const auto conclusion = status_ ? client::conclude(*status_)
                                     : client::Conclusion{client::Conclusion::State::unknown,
                                                          "There is no living service: " + silence_};
+    const auto dated = [now](const std::deque<Moment>& moments) {
+        json rows = json::array();
+        for (const Moment& moment : moments) {
+            json facts = moment.facts;
+            facts["age_s"] = age_s(now, moment.time);
+            rows.push_back(std::move(facts));
+        }
+        return rows;
+    };
     json cameras = json::object();
     for (const auto& [name, camera] : cameras_) {
-        json exposures = json::array();
-        for (const Exposure& exposure : camera.exposures) {
-            json facts = exposure.facts;
-            facts["middle_s"] = seconds_before(now, exposure.middle);
-            exposures.push_back(std::move(facts));
-        }
-        cameras[name] = {{"exposures", std::move(exposures)}, {"withheld", camera.withheld}};
+        cameras[name] = {{"exposures", dated(camera.exposures)}, {"withheld", camera.withheld}};
     }
     json imus = json::object();
     for (const auto& [name, imu] : imus_) {
         json samples = json::array();
         for (const Sample& sample : imu.shown) {
-            json row = json::array({seconds_before(now, sample.time)});
+            json row = json::array({age_s(now, sample.time)});
             for (const float value : sample.values)
                 row.push_back(std::isnan(value) ? json() : json(value));
             samples.push_back(std::move(row));
         }
         imus[name] = std::move(samples);
     }
-    const auto dated = [now](const std::deque<Moment>& moments) {
-        json rows = json::array();
-        for (const Moment& moment : moments) {
-            json facts = moment.facts;
-            facts["age_s"] = -seconds_before(now, moment.time);
-            rows.push_back(std::move(facts));
-        }
-        return rows;
-    };
     return {{"instance", instance_},
             {"conclusion",
              {{"state", client::to_string(conclusion.state)}, {"sentence", conclusion.sentence}}},

@@ -48,14 +48,14 @@ class LiveData {
     std::string metrics(HostTime now) const;
 
  private:
-    struct Exposure {
-        HostTime middle;
+    struct Moment {
+        HostTime time;
         nlohmann::json facts;
     };
     struct Camera {
-        FrameStream frames;    ///< metadata of each
-        FrameStream pictures;  ///< the newest
-        std::deque<Exposure> exposures{};
+        FrameStream frames;              ///< metadata of each
+        FrameStream pictures;            ///< the newest
+        std::deque<Moment> exposures{};  ///< by their middles
         ShownPicture overview{};
         ShownPicture whole{};
         std::map<std::string, std::uint64_t> withheld{};  ///< by reason
@@ -67,10 +67,6 @@ class LiveData {
     struct Imu {
         ImuStream samples;
         std::deque<Sample> shown{};
-    };
-    struct Moment {
-        HostTime time;
-        nlohmann::json facts;
     };
 
     void watch(HostTime now);

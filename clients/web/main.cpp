@@ -13,7 +13,6 @@
 
 #include "base/fail.hpp"
 #include "live_data.hpp"
-#include "posix/file.hpp"
 #include "routes.hpp"
 #include "server.hpp"
 #include "versavis/ring_path.hpp"

@@ -43,6 +43,8 @@ double saturated_part(const client::ExportFormat& format, const std::vector<std:
     return static_cast<double>(saturated) / static_cast<double>(values);
 }
 
+constexpr std::size_t green = 1;
+
 /// 0 red, 1 green, 2 blue.
 std::size_t colour_of(const std::string& pattern, std::uint32_t x, std::uint32_t y) {
     const char colour = pattern[(y & 1U) * 2 + (x & 1U)];
@@ -83,22 +85,38 @@ Pixels demosaic(const Pixels& raw, const std::string& pattern) {
     Pixels made{raw.width, raw.height, 3, {}};
     made.values.resize(std::size_t{raw.width} * raw.height * 3);
     std::uint8_t* to = made.values.data();
-    for (std::uint32_t y = 0; y < raw.height; ++y)
+    // Beyond an edge is what lies as far inside it, which is of the same colour.
+    const auto before = [](std::uint32_t i, std::uint32_t size) {
+        return i > 0 ? i - 1 : std::min(1U, size - 1);
+    };
+    const auto after = [](std::uint32_t i, std::uint32_t size) {
+        return i + 1 < size ? i + 1 : std::max(size, 2U) - 2;
+    };
+    for (std::uint32_t y = 0; y < raw.height; ++y) {
+        const auto row = [&](std::uint32_t v) {
+            return raw.values.data() + std::size_t{v} * raw.width;
+        };
+        const std::uint8_t* above = row(before(y, raw.height));
+        const std::uint8_t* here = row(y);
+        const std::uint8_t* below = row(after(y, raw.height));
+        const std::array own{colour_of(pattern, 0, y), colour_of(pattern, 1, y)};
         for (std::uint32_t x = 0; x < raw.width; ++x, to += 3) {
-            const std::size_t own = colour_of(pattern, x, y);
-            const std::uint8_t value = raw.values[std::size_t{y} * raw.width + x];
-            Sums around;
-            for (std::uint32_t v = y == 0 ? 0 : y - 1; v <= std::min(y + 1, raw.height - 1); ++v)
-                for (std::uint32_t u = x == 0 ? 0 : x - 1; u <= std::min(x + 1, raw.width - 1);
-                     ++u) {
-                    // Green has neighbours of its colour at the corners only, which are not used;
-                    // beside red and blue, green is at the sides only.
-                    around.add(colour_of(pattern, u, v),
-                               raw.values[std::size_t{v} * raw.width + u]);
-                }
-            for (std::size_t colour = 0; colour < 3; ++colour)
-                to[colour] = colour == own ? value : around.mean(colour);
+            const std::uint32_t left = before(x, raw.width);
+            const std::uint32_t right = after(x, raw.width);
+            const std::size_t colour = own[x & 1U];
+            const std::size_t beside = own[~x & 1U];
+            to[colour] = here[x];
+            if (colour == green) {
+                to[beside] = static_cast<std::uint8_t>((here[left] + here[right]) / 2);
+                to[2 - beside] = static_cast<std::uint8_t>((above[x] + below[x]) / 2);
+            } else {
+                to[green] =
+                    static_cast<std::uint8_t>((here[left] + here[right] + above[x] + below[x]) / 4);
+                to[2 - colour] = static_cast<std::uint8_t>(
+                    (above[left] + above[right] + below[left] + below[right]) / 4);
+            }
         }
+    }
     return made;
 }
 

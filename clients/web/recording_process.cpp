@@ -15,15 +15,6 @@ namespace versavis::web {
 
 namespace {
 
-/// The tool is installed beside this program; in a path that is not, it is looked for as by a
-/// shell.
-std::string tool() {
-    std::error_code error;
-    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-    const auto beside = self.parent_path() / "versavis";
-    return std::filesystem::exists(beside, error) ? beside.string() : "versavis";
-}
-
 /// What it printed until its end.
 std::string output_of(const ChildProcess& process) {
     std::string text;
@@ -47,9 +38,9 @@ Expected<> RecordingProcess::begin(HostTime now, std::time_t date) {
     file_ = fmt::format("{}/versavis-{:%Y%m%d-%H%M%S}.mcap", directory_, fmt::localtime(date));
     report_ = nullptr;
     problem_.clear();
-    auto process = ChildProcess::start(
-        {tool(), "--instance", instance_, "record", "--json", "--output", file_},
-        ChildProcess::Errors::inherited);
+    auto process = ChildProcess::start({installed_program("versavis"), "--instance", instance_,
+                                        "record", "--json", "--output", file_},
+                                       ChildProcess::Errors::inherited);
     if (!process) return Unexpected(process.error());
     process_.emplace(std::move(*process));
     begun_ = now;
@@ -63,8 +54,7 @@ Expected<> RecordingProcess::end() {
 }
 
 void RecordingProcess::look(HostTime now) {
-    if (!process_) return;
-    if (!process_->ended()) return;
+    if (!process_ || !process_->ended()) return;
     ended_ = now;
     report_ = client::parse_shallow_json(output_of(*process_));
     process_.reset();

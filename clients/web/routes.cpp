@@ -33,19 +33,23 @@ Response begin_session(const Request& request, const std::string& token) {
     return response;
 }
 
+/// In the address, which only the page and viewers may use: it ends up in histories and logs.
+bool names_token(const Target& target, const Settings& settings) {
+    const auto given = target.query.find("token");
+    return !settings.token.empty() && given != target.query.end() &&
+           equal_secrets(given->second, settings.token);
+}
+
 /// None: it may go on.
 std::optional<Response> refuse(const Request& request, const Target& target,
                                const Settings& settings) {
     if (settings.token.empty()) {
-        const auto host = request[http::field::host];
-        if (names_loopback({host.data(), host.size()})) return std::nullopt;
+        if (names_loopback(as_view(request[http::field::host]))) return std::nullopt;
         return refusal(request, http::status::misdirected_request,
                        "without a token this server answers to localhost and loopback addresses "
                        "only; give it one: --token-file");
     }
-    const auto given = target.query.find("token");
-    if (target.path == "/" && given != target.query.end() &&
-        equal_secrets(given->second, settings.token))
+    if (target.path == "/" && names_token(target, settings))
         return begin_session(request, settings.token);
     if (equal_secrets(token_of(request), settings.token)) return std::nullopt;
     Response response =
@@ -81,11 +85,9 @@ Response picture(const Request& request, const Target& target, LiveData& data) {
 
 /// Browsers name the origin of each POST; only this server's own page may change anything.
 bool from_own_page(const Request& request) {
-    const auto origin = request[http::field::origin];
-    const auto host = request[http::field::host];
-    const std::string_view named(origin.data(), origin.size());
-    return named.empty() ||
-           named.substr(named.find("//") + 2) == std::string_view(host.data(), host.size());
+    const std::string_view origin = as_view(request[http::field::origin]);
+    return origin.empty() ||
+           origin.substr(origin.find("//") + 2) == as_view(request[http::field::host]);
 }
 
 Response recording_facts(const Request& request, RecordingProcess& recording) {
@@ -123,18 +125,20 @@ std::optional<Response> page_file(const Request& request, const std::string& pat
 
 Response route(const Request& request, const Settings& settings, LiveData& data,
                RecordingProcess& recording) {
-    const auto text = request.target();
-    const auto target = parse_target({text.data(), text.size()});
+    const auto target = parse_target(as_view(request.target()));
     if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
     if (auto refused = refuse(request, *target, settings)) return std::move(*refused);
-    if (target->path == "/api/record")
-        return request.method() == http::verb::post ? record(request, *target, recording)
-                                                    : recording_facts(request, recording);
+    const bool of_recording = target->path == "/api/record";
+    if (of_recording && request.method() == http::verb::post)
+        return record(request, *target, recording);
     if (request.method() != http::verb::get && request.method() != http::verb::head) {
-        Response response = refusal(request, http::status::method_not_allowed, "use GET");
-        response.set(http::field::allow, "GET, HEAD");
+        const char* allowed = of_recording ? "GET, HEAD, POST" : "GET, HEAD";
+        Response response = refusal(request, http::status::method_not_allowed,
+                                    std::string("use one of ") + allowed);
+        response.set(http::field::allow, allowed);
         return response;
     }
+    if (of_recording) return recording_facts(request, recording);
     if (auto file = page_file(request, target->path)) return std::move(*file);
     if (target->path == "/api/state")
         return answer(request, http::status::ok, "application/json", data.state(host_now()));
@@ -149,21 +153,15 @@ Response route(const Request& request, const Settings& settings, LiveData& data,
 }  // namespace
 
 std::optional<Response> refuse_viewer(const Request& request, const Settings& settings) {
-    const auto text = request.target();
-    const auto target = parse_target({text.data(), text.size()});
+    const auto target = parse_target(as_view(request.target()));
     if (!target) return refusal(request, http::status::bad_request, "no path, or damaged escapes");
-    const auto given = target->query.find("token");
-    const bool known = !settings.token.empty() && given != target->query.end() &&
-                       equal_secrets(given->second, settings.token);
-    if (!known)
+    if (!names_token(*target, settings))
         if (auto refused = refuse(request, *target, settings)) return refused;
-    const auto origin = request[http::field::origin];
-    if (!settings.allows({origin.data(), origin.size()}))
+    const std::string origin(as_view(request[http::field::origin]));
+    if (!settings.allows(origin))
         return refusal(request, http::status::forbidden,
-                       "a page of " + std::string(origin.data(), origin.size()) +
-                           " may not look; --allow-origin lets it");
-    const auto protocols = request[http::field::sec_websocket_protocol];
-    if (foxglove_protocol({protocols.data(), protocols.size()}).empty())
+                       "a page of " + origin + " may not look; --allow-origin lets it");
+    if (foxglove_protocol(as_view(request[http::field::sec_websocket_protocol])).empty())
         return refusal(request, http::status::bad_request,
                        "this server speaks foxglove.sdk.v1 and foxglove.websocket.v1");
     return std::nullopt;

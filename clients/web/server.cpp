@@ -3,14 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>  // which awaitable.hpp of asio 1.74 forgets
-
-#include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -18,6 +10,8 @@
 #include <cstddef>
 #include <list>
 #include <memory>
+
+#include "coroutine.hpp"
 
 namespace versavis::web {
 
@@ -35,8 +29,6 @@ constexpr std::uint64_t most_body_bytes = 4096;
 constexpr std::chrono::seconds patience{10};
 /// Before it tries again to accept, without a descriptor for that.
 constexpr std::chrono::milliseconds pause{100};
-
-auto into(beast::error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
 /// The connections that there are. In one that waits for a request, nothing is lost: when there are
 /// too many, the one that has waited longest ends.

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "viewer.hpp"
 
-#include <utility>  // which awaitable.hpp of asio 1.74 forgets
-
-#include <boost/asio/awaitable.hpp>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <memory>
 
+#include "coroutine.hpp"
 #include "foxglove.hpp"
 #include "routes.hpp"
 
@@ -34,8 +27,6 @@ constexpr std::chrono::seconds patience{30};
 constexpr std::size_t most_message_bytes = 65536;
 /// What is in the kernel cannot be passed over any more: less than a frame is, of most cameras.
 constexpr int send_buffer_bytes = 512 * 1024;
-
-auto into(beast::error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
 struct Connection {
     Connection(beast::tcp_stream stream, const std::string& instance, LiveData& data)
@@ -96,8 +87,8 @@ asio::awaitable<void> serve(beast::tcp_stream stream, Request request, const Set
     auto& socket = connection->socket;
     socket.set_option(websocket::stream_base::timeout{patience, patience, true});
     socket.read_message_max(most_message_bytes);
-    const auto offered = request[http::field::sec_websocket_protocol];
-    const std::string protocol(foxglove_protocol({offered.data(), offered.size()}));
+    const std::string protocol(
+        foxglove_protocol(as_view(request[http::field::sec_websocket_protocol])));
     socket.set_option(websocket::stream_base::decorator([&](websocket::response_type& response) {
         response.set(http::field::sec_websocket_protocol, protocol);
     }));

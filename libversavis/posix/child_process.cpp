@@ -9,9 +9,15 @@
 
 #include <array>
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 
 namespace versavis {
+
+std::string installed_program(const std::string& name) {
+    std::error_code error;
+    return std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / name;
+}
 
 Expected<ChildProcess> ChildProcess::start(std::vector<std::string> arguments, Errors errors) {
     const auto failed = [&](int error) {

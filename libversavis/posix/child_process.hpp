@@ -13,6 +13,9 @@
 
 namespace versavis {
 
+/// Where a program is that was installed with this one.
+std::string installed_program(const std::string& name);
+
 class ChildProcess {
  public:
     enum class Errors { inherited, dropped };  ///< where its standard error goes

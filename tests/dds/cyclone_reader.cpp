@@ -70,6 +70,26 @@ json to_json(const diagnostic_msgs_msg_dds__DiagnosticArray_& array) {
     return {{"header", stamp(array.header_)}, {"status", statuses}};
 }
 
+/// What ROS 2 reads of a writer before any message: its type, and the hash of that.
+void print_writers(dds_entity_t reader) {
+    void* samples[1]{};
+    dds_sample_info_t info[1];
+    while (dds_take(reader, samples, info, 1, 1) > 0) {
+        const auto* writer = static_cast<const dds_builtintopic_endpoint_t*>(samples[0]);
+        void* data = nullptr;
+        std::size_t size = 0;
+        if (info[0].valid_data && dds_qget_userdata(writer->qos, &data, &size)) {
+            const json line{{"topic", "writers"},
+                            {"of", writer->topic_name},
+                            {"type", writer->type_name},
+                            {"userdata", std::string(static_cast<const char*>(data), size)}};
+            std::puts(line.dump().c_str());
+            dds_free(data);
+        }
+        dds_return_loan(reader, samples, 1);
+    }
+}
+
 struct Topic {
     std::string name;
     dds_entity_t reader;
@@ -128,9 +148,13 @@ int main(int argc, char** argv) {
                                                      sensor_msgs_msg_dds__Imu__desc));
     topics.push_back(open<diagnostic_msgs_msg_dds__DiagnosticArray_>(
         participant, "/diagnostics", diagnostic_msgs_msg_dds__DiagnosticArray__desc));
+    const auto writers =
+        dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
     pollfd input{0, POLLIN, 0};
-    while (::poll(&input, 1, 2) == 0)
+    while (::poll(&input, 1, 2) == 0) {
+        print_writers(writers);
         for (const Topic& topic : topics) take(topic);
+    }
     dds_delete(participant);
     return 0;
 }

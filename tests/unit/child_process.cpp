@@ -8,6 +8,7 @@
 
 #include <catch2/catch.hpp>
 #include <cerrno>
+#include <filesystem>
 #include <optional>
 
 using namespace versavis;
@@ -61,6 +62,11 @@ TEST_CASE("child_process: takes signals, and its end is seen before it is waited
     CHECK(WIFSIGNALED(status));
     CHECK(WTERMSIG(status) == SIGTERM);
     process->send(SIGTERM);  // to nobody
+}
+
+TEST_CASE("child_process: programs are installed together") {
+    CHECK(std::filesystem::exists(installed_program("unit_tests")));
+    CHECK_FALSE(std::filesystem::exists(installed_program("no_such_program")));
 }
 
 TEST_CASE("child_process: a program that is not there is an error") {

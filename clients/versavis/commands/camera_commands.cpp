@@ -6,9 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
 #include <system_error>
 #include <vector>
+
+#include "posix/child_process.hpp"
 
 namespace versavis::client {
 
@@ -41,9 +42,7 @@ CameraCommands::CameraCommands(CLI::App& app) {
 }
 
 int CameraCommands::run() {
-    std::error_code error;
-    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-    const std::string program = self.parent_path() / "versavisd";
+    const std::string program = installed_program("versavisd");
     std::vector<std::string> arguments{program, "--check-cameras"};
     if (probe_->parsed()) arguments = {program, "--probe-camera", device_};
     if (!configuration_.empty()) arguments.insert(arguments.end(), {"--config", configuration_});

@@ -6,16 +6,13 @@
 
 #include <array>
 #include <cerrno>
-#include <filesystem>
 
 #include "posix/child_process.hpp"
 
 namespace versavis::client {
 
 Expected<ProgramResult> run_versavisd(std::vector<std::string> arguments) {
-    std::error_code error;
-    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-    const std::string program = self.parent_path() / "versavisd";
+    const std::string program = installed_program("versavisd");
     arguments.insert(arguments.begin(), program);
     auto process = ChildProcess::start(std::move(arguments), ChildProcess::Errors::inherited);
     if (!process)

@@ -47,9 +47,8 @@ Findings check_configuration(const Subject& subject) {
                  subject.configuration_error.where + ": " + subject.configuration_error.what,
                  subject.configuration_error.cure}};
     const std::string path = subject.configuration->path;
+    const std::string program = installed_program("versavisd");
     std::error_code error;
-    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-    const std::string program = self.parent_path() / "versavisd";
     if (!std::filesystem::exists(program, error)) return {};
     auto check = ChildProcess::start({program, "--check-config", "--config", path},
                                      ChildProcess::Errors::dropped);

@@ -138,7 +138,7 @@ function draw_exposures(cameras) {
     const {pen, width, height} = begin_drawing(canvas);
     const left = 72, seconds = 1;
     const newest = Math.max(...names.flatMap((name) =>
-        cameras[name].exposures.map((exposure) => exposure.middle_s)));
+        cameras[name].exposures.map((exposure) => -exposure.age_s)));
     if (!isFinite(newest)) {
         pen.fillStyle = colour("--faint");
         pen.fillText("no exposure in the last two seconds", left, 20);
@@ -152,8 +152,8 @@ function draw_exposures(cameras) {
         pen.strokeStyle = colour("--line");
         pen.strokeRect(left, top, width - left - 4, 20);
         for (const exposure of cameras[name].exposures) {
-            const from = x(exposure.middle_s - exposure.exposure_s / 2);
-            const to = x(exposure.middle_s + exposure.exposure_s / 2);
+            const from = x(-exposure.age_s - exposure.exposure_s / 2);
+            const to = x(-exposure.age_s + exposure.exposure_s / 2);
             if (from < left) continue;
             const proved = exposure.kind === "measured" && !exposure.suspect;
             pen.fillStyle = colour(exposure.suspect ? "--bad" : "--plot0");
@@ -172,7 +172,7 @@ function middle_distance_ns(cameras) {
         for (const exposure of camera.exposures) {
             if (exposure.kind !== "measured") continue;
             const at = middles.get(exposure.tick) ?? [];
-            at.push(exposure.middle_s);
+            at.push(exposure.age_s);
             middles.set(exposure.tick, at);
         }
     const distances = [...middles.values()].filter((at) => at.length > 1)
@@ -390,7 +390,7 @@ function update_imus(state) {
     for (const [name, samples] of Object.entries(state.imus)) {
         if (!imus.has(name)) imus.set(name, imu_plots(name));
         const lines = (first) => ["x", "y", "z"].map((axis, i) =>
-            ({name: axis, points: samples.map((sample) => [sample[0], sample[first + i]])}));
+            ({name: axis, points: samples.map((sample) => [-sample[0], sample[first + i]])}));
         const [rotation, acceleration] = imus.get(name);
         draw_lines(rotation, lines(1), 5, "rad/s", false);
         draw_lines(acceleration, lines(4), 5, "m/s²", false);
