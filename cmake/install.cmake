@@ -28,6 +28,8 @@ include(CMakePackageConfigHelpers)
 write_basic_package_version_file(versavis-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis-config-version.cmake
     DESTINATION ${package_directory})
+# Packages for workspaces of ROS, which build them with their own release of it.
+install(DIRECTORY clients/ros/ DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis/ros)
 # relative_to_pkgconfig(NAME DIRECTORY): sets NAME, so that the whole may be moved.
 function(relative_to_pkgconfig name directory)
     cmake_path(RELATIVE_PATH directory BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)

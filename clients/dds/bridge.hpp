@@ -6,13 +6,10 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "versavis/stream.hpp"
-#include "versavis/wait_set.hpp"
+#include "ros_client/stream_group.hpp"
 #include "writer.hpp"
 
 namespace versavis::dds {
@@ -23,41 +20,35 @@ struct BridgeCounts {
     std::uint64_t lost = 0;       ///< items that were overwritten before they were read
 };
 
-class Bridge {
+class Bridge : private ros_client::Sink {
  public:
     /// `prefix` of all topics but /diagnostics, as "/car"; may be empty.
-    Bridge(const Participant& participant, std::string instance, std::string prefix);
-    ~Bridge();
+    Bridge(const Participant& participant, const std::string& instance, std::string prefix);
 
     /// Publishes what has come, waiting for it up to `timeout`. Errors: of Cyclone DDS.
     Expected<> turn(Duration timeout);
 
-    const BridgeCounts& counts() const { return counts_; }
+    BridgeCounts counts() const { return {sent_, overtaken_, streams_.lost()}; }
 
  private:
-    struct Source;
+    /// Topics are there before the first message, so that nodes find them.
+    Expected<> on_stream(const std::string& name, ring::StreamKind kind) override;
+    Expected<> on_frame(const std::string& name, const Frame& frame) override;
+    Expected<> on_sample(const std::string& name, const ImuSample& sample) override;
+    Expected<> on_event(const std::string& name, const Event& event) override;
 
-    Expected<> look_for_streams();
-    Expected<> announce(Source& source);
-    Expected<> publish(Source& source);
-    Expected<> publish_frame(Source& source, const Frame& frame);
-    Expected<> publish_sample(Source& source, const ImuSample& sample);
-    Expected<> publish_event(Source& source, const Event& event);
     Expected<> publish_diagnostics();
-    Expected<> send(Source& source, const std::string& topic, const char* type,
-                    const std::string& message);
-    Expected<Writer*> writer(Source& source, const std::string& topic, const char* type);
+    Expected<> send(const std::string& topic, const char* type, const std::string& message);
+    Expected<Writer*> writer(const std::string& topic, const char* type);
 
     const Participant& participant_;
     std::string instance_;
     std::string prefix_;
-    std::map<std::string, std::unique_ptr<Source>> sources_;
-    std::vector<Source*> waiting_;  ///< in the order of the wait set
-    std::optional<WaitSet> wait_set_;
-    std::optional<Writer> diagnostics_;
-    BridgeCounts counts_;
-    HostTime searched_{INT64_MIN};
-    HostTime reported_{INT64_MIN};
+    ros_client::StreamGroup streams_;
+    std::map<std::string, Writer> writers_;  ///< by topic
+    std::optional<HostTime> reported_;
+    std::uint64_t sent_ = 0;
+    std::uint64_t overtaken_ = 0;
 };
 
 }  // namespace versavis::dds

@@ -28,7 +28,7 @@ int serve(const std::string& instance, const std::string& prefix, const NetworkS
     while (stop_requested == 0)
         if (const auto done = bridge.turn(milliseconds(100)); !done)
             return client::fail(done.error());
-    const BridgeCounts& counts = bridge.counts();
+    const BridgeCounts counts = bridge.counts();
     fmt::print("{} messages sent, {} frames overtaken, {} items lost\n", counts.sent,
                counts.overtaken, counts.lost);
     return EX_OK;

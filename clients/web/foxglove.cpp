@@ -10,6 +10,7 @@
 #include "http.hpp"
 #include "recording/item_messages.hpp"
 #include "recording/ros_messages.hpp"
+#include "ros_client/names.hpp"
 
 namespace versavis::web {
 
@@ -84,7 +85,7 @@ void FoxgloveSession::report(int level, const std::string& message) {
 
 void FoxgloveSession::advertise(const std::string& stream, ring::StreamKind kind) {
     if (!streams_.emplace(stream, kind).second) return;
-    const std::string base = "/" + client::ros_topic_part(stream);
+    const std::string base = "/" + ros_client::topic_part(stream);
     std::vector<Channel> made;
     if (kind == ring::StreamKind::frames)
         made = {{base + "/image_raw", "sensor_msgs/msg/Image", stream, Content::image},

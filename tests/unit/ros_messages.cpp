@@ -94,20 +94,6 @@ TEST_CASE("ros_messages: times before 1970 and their rest") {
     CHECK(message_at<std::uint32_t>(message, 8) == 999'999'999);
 }
 
-TEST_CASE("ros_messages: pixel formats have the names that ROS has") {
-    CHECK(ros_encoding(0x01080001) == "mono8");
-    CHECK(ros_encoding(0x01100005) == "mono16");
-    CHECK(ros_encoding(0x01100007) == "mono16");
-    CHECK(ros_encoding(0x01080008) == "bayer_grbg8");
-    CHECK(ros_encoding(0x01080009) == "bayer_rggb8");
-    CHECK(ros_encoding(0x0108000A) == "bayer_gbrg8");
-    CHECK(ros_encoding(0x0108000B) == "bayer_bggr8");
-    CHECK(ros_encoding(0x02180014) == "rgb8");
-    CHECK(ros_encoding(0x02180015) == "bgr8");
-    CHECK(ros_encoding(0x010C0047) == "Mono12p");
-    CHECK(ros_encoding(7) == "unknown");
-}
-
 TEST_CASE("ros_messages: each type is defined with all that it is made of") {
     const std::string imu = ros_definition("sensor_msgs/msg/Imu");
     for (const char* part :

@@ -18,6 +18,7 @@
 #include "process/stamp_choice.hpp"
 #include "recording/item_messages.hpp"
 #include "recording/recording.hpp"
+#include "ros_client/names.hpp"
 
 namespace versavis::client {
 
@@ -555,7 +556,7 @@ std::optional<McapTopic> converted_topic(const McapChannel& channel) {
     const std::size_t rest = channel.topic.rfind('/');
     const bool of_stream = item || role.role == Role::stamp || role.role == Role::gap;
     return recorded_topic(
-        of_stream ? "/versavis/" + ros_topic_part(role.stream) + channel.topic.substr(rest)
+        of_stream ? "/versavis/" + ros_client::topic_part(role.stream) + channel.topic.substr(rest)
                   : channel.topic,
         type_of(role.role), role.stream, item ? std::optional(role.kind) : std::nullopt);
 }

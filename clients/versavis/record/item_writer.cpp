@@ -5,6 +5,7 @@
 
 #include "base/byte_cursor.hpp"
 #include "recording/mcap_record.hpp"
+#include "ros_client/names.hpp"
 
 namespace versavis::client {
 
@@ -16,11 +17,11 @@ constexpr std::uint32_t utc_label = static_cast<std::uint32_t>(EventKind::utc_la
 constexpr std::int64_t status_period_ns = 900'000'000;
 
 std::string own_topic(const std::string& stream, const char* part) {
-    return "/versavis/" + ros_topic_part(stream) + part;
+    return "/versavis/" + ros_client::topic_part(stream) + part;
 }
 
 std::string ros_topic(const std::string& stream, const char* part) {
-    return "/" + ros_topic_part(stream) + part;
+    return "/" + ros_client::topic_part(stream) + part;
 }
 
 std::span<const std::byte> as_bytes(const std::string& text) {

@@ -273,15 +273,6 @@ std::optional<GapMessage> parse_old_gap(std::span<const std::byte> message) {
 
 std::string text_message(std::string_view text) { return CdrWriter().text(text).bytes(); }
 
-std::string ros_topic_part(std::string_view stream) {
-    std::string part(stream);
-    for (char& one : part) {
-        const bool letter = (one >= 'a' && one <= 'z') || (one >= 'A' && one <= 'Z');
-        if (!letter && !(one >= '0' && one <= '9')) one = '_';
-    }
-    return part.front() >= '0' && part.front() <= '9' ? "_" + part : part;
-}
-
 McapTopic recorded_topic(const std::string& topic, std::string_view type, const std::string& stream,
                          std::optional<ring::StreamKind> kind) {
     // The profile wants QoS of publishers. None: a player offers its default, to which every

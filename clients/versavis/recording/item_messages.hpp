@@ -85,9 +85,6 @@ std::optional<GapMessage> parse_old_gap(std::span<const std::byte> message);
 /// std_msgs/msg/String.
 std::string text_message(std::string_view text);
 
-/// A part of a topic that ROS accepts: letters, digits and underscores, no digit in front.
-std::string ros_topic_part(std::string_view stream);
-
 /// A channel of a recording, with the definition of its type. `kind`: of a channel of items.
 /// The topic that role_of() finds its role by.
 McapTopic recorded_topic(const std::string& topic, std::string_view type, const std::string& stream,

@@ -9,7 +9,7 @@
 
 #include "recording/cdr_writer.hpp"
 #include "recording/item_messages.hpp"
-#include "versavis/pixel_format.hpp"
+#include "ros_client/names.hpp"
 
 namespace versavis::client {
 
@@ -74,30 +74,7 @@ std::string part(std::string_view name) {
 
 constexpr std::array<double, 9> unknown{};  ///< a covariance
 
-/// "" unless the format's name is one of Bayer.
-std::string bayer_encoding(std::string_view name, unsigned bits) {
-    constexpr std::pair<std::string_view, const char*> patterns[]{{"BayerRG", "bayer_rggb"},
-                                                                  {"BayerBG", "bayer_bggr"},
-                                                                  {"BayerGB", "bayer_gbrg"},
-                                                                  {"BayerGR", "bayer_grbg"}};
-    for (const auto& [begin, pattern] : patterns)
-        if (name.substr(0, begin.size()) == begin) return pattern + std::to_string(bits);
-    return {};
-}
-
 }  // namespace
-
-std::string ros_encoding(std::uint32_t pixel_format) {
-    const std::string_view name = pixel_format_name(pixel_format);
-    const PixelLayout layout = pixel_layout(pixel_format);
-    if (layout.channels == 0) return std::string(name);
-    const unsigned bits = 8 * layout.bytes_per_channel;
-    if (name == "RGB8") return "rgb8";
-    if (name == "BGR8") return "bgr8";
-    if (name.substr(0, 4) == "Mono") return "mono" + std::to_string(bits);
-    const std::string bayer = bayer_encoding(name, bits);
-    return bayer.empty() ? std::string(name) : bayer;
-}
 
 std::string ros_image_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                            std::uint32_t length) {
@@ -106,7 +83,7 @@ std::string ros_image_head(OutputTime time, std::string_view stream, const Frame
         .header(time, stream)
         .number(frame.height)
         .number(frame.width)
-        .text(ros_encoding(frame.pixel_format))
+        .text(ros_client::encoding_of(frame.pixel_format))
         .number(little_endian)
         .number(frame.stride)
         .number(length)
@@ -120,7 +97,7 @@ std::string ros_compressed_head(OutputTime time, std::string_view stream, std::s
 
 std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                          std::uint32_t length) {
-    const std::string encoding = ros_encoding(frame.pixel_format);
+    const std::string encoding = ros_client::encoding_of(frame.pixel_format);
     return ros_compressed_head(time, stream, encoding + "; png compressed " + encoding, length);
 }
 

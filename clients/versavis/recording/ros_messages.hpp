@@ -12,9 +12,6 @@
 
 namespace versavis::client {
 
-/// The name that ROS has for a pixel format; that of PFNC where it has none.
-std::string ros_encoding(std::uint32_t pixel_format);
-
 /// sensor_msgs/msg/Image up to its pixels, of which `length` bytes follow.
 std::string ros_image_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                            std::uint32_t length);

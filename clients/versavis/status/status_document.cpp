@@ -10,28 +10,15 @@
 
 #include "base/shallow_json.hpp"
 #include "posix/child_process.hpp"
+#include "versavis/status.hpp"
 
 namespace versavis::client {
 
 Expected<nlohmann::json> read_status(const std::string& instance) {
     StreamOptions options;
     options.instance = instance;
-    auto stream = StatusStream::open("status", options);
-    if (!stream) return Unexpected(stream.error());
-    std::optional<std::string> newest;
-    for (int attempts = 0; attempts < 3 && !newest; ++attempts) {
-        const auto item = stream->latest(seconds(1));
-        if (!item) continue;
-        std::string text(item->payload.size(), '\0');
-        if (item->payload.copy_to(reinterpret_cast<std::byte*>(text.data())))
-            newest = std::move(text);
-    }
-    if (!stream->reader().writer_alive())
-        return failure(fmt::format("instance {}", instance), "the service has died or hangs",
-                       "see its log ('journalctl -u versavisd'), then restart it");
-    if (!newest)
-        return failure(fmt::format("instance {}", instance),
-                       "the service has not published its status yet", "try again in a second");
+    const auto newest = versavis::read_status(options);
+    if (!newest) return Unexpected(newest.error());
     auto document = parse_shallow_json(*newest);
     if (!document.is_object() || document.value("schema", nlohmann::json()) != 1)
         return failure(fmt::format("instance {}", instance),
