@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/json_text.hpp"
 #include "doctor/service_checks.hpp"
 #include "http.hpp"
 #include "status/status_document.hpp"
@@ -266,6 +267,21 @@ const ShownPicture* LiveData::picture(const std::string& name, bool whole, HostT
     shown.facts = facts_of(*frame, *picture);
     shown.jpeg = std::move(picture->jpeg);
     return &shown;
+}
+
+Expected<client::WiredParts> LiveData::wiring() const {
+    const auto status = client::read_status(instance_);
+    if (!status) return Unexpected(status.error());
+    const auto preset_of = [&](const std::string& name, const std::string& /*device*/) {
+        for (const json& camera : status->value("cameras", json::array()))
+            if (client::text(camera, "name") == name) return client::text(camera, "preset");
+        return std::string();
+    };
+    const std::string path = client::text(*status, "configuration");
+    auto parts = client::configured_wiring(path, preset_of);
+    if (parts && parts->cameras.empty() && parts->imus.empty())
+        return failure(path, "has no camera or IMU at the board");
+    return parts;
 }
 
 std::string LiveData::metrics(HostTime now) const {

@@ -14,6 +14,7 @@
 
 #include "picture.hpp"
 #include "versavis/stream.hpp"
+#include "wiring/wired_parts.hpp"
 
 namespace versavis::web {
 
@@ -45,6 +46,10 @@ class LiveData {
     const ShownPicture* picture(const std::string& camera, bool whole, HostTime now);
 
     /// OpenMetrics.
+    /// The circuits of the service's configuration. Errors: it cannot be read; no part is at the
+    /// board.
+    Expected<client::WiredParts> wiring() const;
+
     std::string metrics(HostTime now) const;
 
  private:

@@ -5,6 +5,8 @@
 
 #include "foxglove.hpp"
 #include "page_files.hpp"
+#include "wiring/wiring_drawing.hpp"
+#include "wiring/wiring_text.hpp"
 
 namespace versavis::web {
 
@@ -111,6 +113,17 @@ Response record(const Request& request, const Target& target, RecordingProcess& 
     return recording_facts(request, recording);
 }
 
+Response wiring(const Request& request, bool drawn, const LiveData& data) {
+    const auto parts = data.wiring();
+    if (!parts) return refusal(request, http::status::not_found, parts.error().message());
+    if (!drawn)
+        return answer(request, http::status::ok, "text/plain; charset=utf-8",
+                      client::wiring_text(*parts));
+    const auto sheets = client::drawings(*parts);
+    if (sheets.empty()) return answer(request, http::status::no_content, "image/svg+xml", "");
+    return answer(request, http::status::ok, "image/svg+xml", client::to_svg(sheets));
+}
+
 /// None: not a file of the page.
 std::optional<Response> page_file(const Request& request, const std::string& path) {
     const auto file = [&](std::string_view type, std::string_view content) {
@@ -146,6 +159,8 @@ Response route(const Request& request, const Settings& settings, LiveData& data,
         return answer(request, http::status::ok,
                       "application/openmetrics-text; version=1.0.0; charset=utf-8",
                       data.metrics(host_now()));
+    if (target->path == "/api/wiring.svg" || target->path == "/api/wiring.txt")
+        return wiring(request, target->path.ends_with(".svg"), data);
     if (target->path.starts_with(picture_path)) return picture(request, *target, data);
     return refusal(request, http::status::not_found, "there is no " + target->path);
 }

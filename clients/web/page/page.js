@@ -455,6 +455,18 @@ const recording = {
     },
 };
 
+/** Read when it is opened: a configuration does not change by itself. */
+async function show_wiring() {
+    if (!by_id("wiring").open) return;
+    const drawing = by_id("wiring-drawing");
+    drawing.hidden = true;
+    drawing.onload = () => { drawing.hidden = false; };
+    const answer = await fetch("/api/wiring.txt");
+    set_text(by_id("wiring-text"), answer.ok ? await answer.text() : (await answer.json()).error);
+    const drawn = await fetch("/api/wiring.svg");
+    if (drawn.status === 200) drawing.src = URL.createObjectURL(await drawn.blob());
+}
+
 function update(state) {
     set_text(by_id("instance"), state.instance);
     document.title = `${state.instance}: ${state.conclusion.state} - VersaVIS`;
@@ -489,6 +501,8 @@ async function look() {
     setTimeout(look, state_period_ms);
 }
 
+by_id("wiring").ontoggle = () => show_wiring().catch((error) =>
+    set_text(by_id("wiring-text"), error.message));
 zoom.start();
 recording.start();
 look();
