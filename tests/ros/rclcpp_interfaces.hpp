@@ -68,10 +68,7 @@ bool shutdown();
 
 namespace rclcpp_lifecycle {
 
-class State {
- public:
-    std::uint8_t id() const;
-};
+class State {};
 
 template <class Message>
 class LifecyclePublisher : public rclcpp::PublisherBase {
@@ -109,7 +106,6 @@ class LifecycleNode : public node_interfaces::LifecycleNodeInterface {
     rclcpp::Logger get_logger() const;
     rclcpp::Clock::SharedPtr get_clock();
     rclcpp::node_interfaces::NodeBaseInterface::SharedPtr get_node_base_interface();
-    const State& get_current_state() const;
     const State& configure();
     const State& activate();
 

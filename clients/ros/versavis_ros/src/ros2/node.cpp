@@ -5,7 +5,6 @@
 
 #include <camera_calibration_parsers/parse.hpp>
 #include <cmath>
-#include <lifecycle_msgs/msg/state.hpp>
 #include <rclcpp_components/register_node_macro.hpp>
 #include <utility>
 
@@ -152,10 +151,7 @@ Node::Publisher<Message> Node::publisher(const std::string& topic) {
     rclcpp::PublisherOptions options;
     options.qos_overriding_options = rclcpp::QosOverridingOptions::with_default_policies();
     auto made = create_publisher<Message>(topic, rclcpp::QoS(queue_depth), options);
-    if (stop_requested_ ||
-        get_current_state().id() == lifecycle_msgs::msg::State::PRIMARY_STATE_UNCONFIGURED)
-        return made;
-    made->on_activate();  // it was made while the node is active
+    made->on_activate();  // only the thread of an active node publishes
     return made;
 }
 

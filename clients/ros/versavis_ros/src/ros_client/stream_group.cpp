@@ -45,6 +45,10 @@ Expected<> StreamGroup::look_for_streams() {
         problem_ = streams.error();
         return {};
     }
+    for (const std::string& name : wanted_)
+        if (std::none_of(streams->begin(), streams->end(),
+                         [&](const StreamInfo& info) { return info.name == name; }))
+            problem_ = Error{name, "there is no such stream", "see 'versavis list'"};
     std::vector<std::pair<std::string, ring::StreamKind>> found;
     for (const StreamInfo& info : *streams) {
         if (!is_wanted(info.name) || sources_.count(info.name) != 0) continue;

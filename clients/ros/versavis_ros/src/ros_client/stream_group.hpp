@@ -39,7 +39,7 @@ class StreamGroup {
     /// Items that were overwritten before they were read.
     std::uint64_t lost() const { return lost_; }
 
-    /// Why streams could not be looked for, as long as that is so.
+    /// Why streams are not read that should be, as long as that is so.
     const std::optional<Error>& problem() const { return problem_; }
 
  private:
