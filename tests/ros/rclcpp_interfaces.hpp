@@ -63,6 +63,7 @@ class SingleThreadedExecutor {
 
 void init(int argc, char const* const* argv);
 bool shutdown();
+bool ok();
 
 }  // namespace rclcpp
 

@@ -57,8 +57,6 @@ Node::~Node() { stop(); }
 
 Node::Result Node::on_configure(const rclcpp_lifecycle::State& /*state*/) {
     instance_ = get_parameter("instance").as_string();
-    const auto wanted = get_parameter("streams").as_string_array();
-    streams_.emplace(instance_, wanted, static_cast<ros_client::Sink&>(*this));
     diagnostics_ = publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics");
     if (const auto topic = get_parameter("sync_diagnostics.topic").as_string(); !topic.empty())
         graph_ = publisher<std_msgs::msg::UInt8MultiArray>(topic);
@@ -67,6 +65,10 @@ Node::Result Node::on_configure(const rclcpp_lifecycle::State& /*state*/) {
 
 Node::Result Node::on_activate(const rclcpp_lifecycle::State& state) {
     LifecycleNode::on_activate(state);
+    // What was published while the node was inactive is nobody's.
+    streams_.emplace(instance_, get_parameter("streams").as_string_array(),
+                     static_cast<ros_client::Sink&>(*this));
+    overtaken_ = reported_lost_ = 0;
     stop_requested_ = false;
     thread_ = std::thread(&Node::run, this);
     return Result::SUCCESS;
@@ -99,16 +101,21 @@ void Node::stop() {
 }
 
 void Node::run() {
-    std::optional<HostTime> reported;
-    while (!stop_requested_) {
-        if (const auto done = streams_->turn(milliseconds(100)); !done) {
-            RCLCPP_FATAL(get_logger(), "%s", done.error().message().c_str());
-            return;
+    const auto end = [this](const std::string& why) {
+        RCLCPP_FATAL(get_logger(), "%s; deactivate and activate the node to go on", why.c_str());
+    };
+    try {
+        std::optional<HostTime> reported;
+        while (!stop_requested_) {
+            if (const auto done = streams_->turn(milliseconds(100)); !done)
+                return end(done.error().message());
+            if (const HostTime now = host_now(); !reported || now - *reported >= report_period) {
+                reported = now;
+                report();
+            }
         }
-        if (const HostTime now = host_now(); !reported || now - *reported >= report_period) {
-            reported = now;
-            report();
-        }
+    } catch (const std::exception& error) {  // of rclcpp: a parameter of another type, ...
+        if (rclcpp::ok()) end(error.what());
     }
 }
 
@@ -172,6 +179,7 @@ void Node::read_calibration(const std::string& name, Camera& camera) {
 
 Expected<> Node::on_stream(const std::string& name, ring::StreamKind kind) {
     const std::string base = ros_client::topic_part(name);
+    if (cameras_.count(name) + imus_.count(name) > 0) return {};  // from before it was inactive
     if (kind == ring::StreamKind::frames) {
         Camera& camera = cameras_[name];
         camera.frame_id = parameter(name + ".frame_id", name);
@@ -185,7 +193,7 @@ Expected<> Node::on_stream(const std::string& name, ring::StreamKind kind) {
         imu.frame_id = parameter(name + ".frame_id", name);
         imu.samples = publisher<sensor_msgs::msg::Imu>(base + "/data_raw");
     }
-    if (kind == ring::StreamKind::events) {
+    if (kind == ring::StreamKind::events && !events_) {
         events_ = publisher<versavis_msgs::msg::Event>("events");
         utc_ = publisher<sensor_msgs::msg::TimeReference>("utc");
     }
