@@ -272,13 +272,9 @@ const ShownPicture* LiveData::picture(const std::string& name, bool whole, HostT
 Expected<client::WiredParts> LiveData::wiring() const {
     const auto status = client::read_status(instance_);
     if (!status) return Unexpected(status.error());
-    const auto preset_of = [&](const std::string& name, const std::string& /*device*/) {
-        for (const json& camera : status->value("cameras", json::array()))
-            if (client::text(camera, "name") == name) return client::text(camera, "preset");
-        return std::string();
-    };
     const std::string path = client::text(*status, "configuration");
-    auto parts = client::configured_wiring(path, preset_of);
+    auto parts = client::configured_wiring(
+        path, [&](const auto& name, const auto&) { return client::preset_of(*status, name); });
     if (parts && parts->cameras.empty() && parts->imus.empty())
         return failure(path, "has no camera or IMU at the board");
     return parts;

@@ -29,9 +29,7 @@ class Presets {
 
     std::string of(const std::string& name, const std::string& device) {
         if (status_)
-            for (const json& camera : status_->value("cameras", json::array()))
-                if (camera.value("name", "") == name && !camera.value("preset", "").empty())
-                    return camera.value("preset", "");
+            if (std::string preset = preset_of(*status_, name); !preset.empty()) return preset;
         if (!devices_) {
             fmt::print(stderr, "Looking for cameras ...\n");
             const auto found = find_devices({});

@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "base/json_text.hpp"
 #include "base/shallow_json.hpp"
 #include "posix/child_process.hpp"
 #include "versavis/status.hpp"
@@ -73,6 +74,12 @@ std::string configuration_path(const std::string& named,
     if (!named.empty()) return named;
     const std::string read = status ? status->value("configuration", "") : "";
     return read.empty() ? VERSAVIS_SYSCONFDIR "/versavis/versavis.toml" : read;
+}
+
+std::string preset_of(const nlohmann::json& status, const std::string& name) {
+    for (const auto& camera : status.value("cameras", nlohmann::json::array()))
+        if (text(camera, "name") == name) return text(camera, "preset");
+    return "";
 }
 
 Error explain(const Error& error, const std::string& instance, const std::string& stream) {

@@ -28,6 +28,9 @@ Error explain_silence(Error error);
 std::string configuration_path(const std::string& named,
                                const std::optional<nlohmann::json>& status);
 
+/// By which the service set up the camera `name`; empty: not known.
+std::string preset_of(const nlohmann::json& status, const std::string& name);
+
 /// Why `stream` cannot be read: what the service says is wrong with the device of this name, if it
 /// says so, else `error`.
 Error explain(const Error& error, const std::string& instance, const std::string& stream);

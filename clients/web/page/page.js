@@ -460,7 +460,10 @@ async function show_wiring() {
     if (!by_id("wiring").open) return;
     const drawing = by_id("wiring-drawing");
     drawing.hidden = true;
-    drawing.onload = () => { drawing.hidden = false; };
+    drawing.onload = () => {
+        URL.revokeObjectURL(drawing.src);
+        drawing.hidden = false;
+    };
     const answer = await fetch("/api/wiring.txt");
     set_text(by_id("wiring-text"), answer.ok ? await answer.text() : (await answer.json()).error);
     const drawn = await fetch("/api/wiring.svg");

@@ -30,6 +30,7 @@ namespace {
 
 constexpr Duration report_period = seconds(1);
 constexpr std::size_t queue_depth = 5;
+constexpr std::size_t imu_queue_depth = 200;
 
 bool is_read(const rclcpp::PublisherBase& publisher) {
     return publisher.get_subscription_count() > 0;
@@ -57,9 +58,9 @@ Node::~Node() { stop(); }
 
 Node::Result Node::on_configure(const rclcpp_lifecycle::State& /*state*/) {
     instance_ = get_parameter("instance").as_string();
-    diagnostics_ = publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics");
+    diagnostics_ = publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics", queue_depth);
     if (const auto topic = get_parameter("sync_diagnostics.topic").as_string(); !topic.empty())
-        graph_ = publisher<std_msgs::msg::UInt8MultiArray>(topic);
+        graph_ = publisher<std_msgs::msg::UInt8MultiArray>(topic, queue_depth);
     return Result::SUCCESS;
 }
 
@@ -154,10 +155,10 @@ std::string Node::parameter(const std::string& name, const std::string& otherwis
 
 /// Publishes as nodes do that nobody has configured; qos_overrides parameters change it.
 template <class Message>
-Node::Publisher<Message> Node::publisher(const std::string& topic) {
+Node::Publisher<Message> Node::publisher(const std::string& topic, std::size_t depth) {
     rclcpp::PublisherOptions options;
     options.qos_overriding_options = rclcpp::QosOverridingOptions::with_default_policies();
-    auto made = create_publisher<Message>(topic, rclcpp::QoS(queue_depth), options);
+    auto made = create_publisher<Message>(topic, rclcpp::QoS(depth), options);
     made->on_activate();  // only the thread of an active node publishes
     return made;
 }
@@ -184,18 +185,18 @@ Expected<> Node::on_stream(const std::string& name, ring::StreamKind kind) {
         Camera& camera = cameras_[name];
         camera.frame_id = parameter(name + ".frame_id", name);
         read_calibration(name, camera);
-        camera.images = publisher<sensor_msgs::msg::Image>(base + "/image_raw");
-        camera.infos = publisher<sensor_msgs::msg::CameraInfo>(base + "/camera_info");
-        camera.stamps = publisher<versavis_msgs::msg::Stamp>(base + "/stamp");
+        camera.images = publisher<sensor_msgs::msg::Image>(base + "/image_raw", queue_depth);
+        camera.infos = publisher<sensor_msgs::msg::CameraInfo>(base + "/camera_info", queue_depth);
+        camera.stamps = publisher<versavis_msgs::msg::Stamp>(base + "/stamp", queue_depth);
     }
     if (kind == ring::StreamKind::imu) {
         Imu& imu = imus_[name];
         imu.frame_id = parameter(name + ".frame_id", name);
-        imu.samples = publisher<sensor_msgs::msg::Imu>(base + "/data_raw");
+        imu.samples = publisher<sensor_msgs::msg::Imu>(base + "/data_raw", imu_queue_depth);
     }
     if (kind == ring::StreamKind::events && !events_) {
-        events_ = publisher<versavis_msgs::msg::Event>("events");
-        utc_ = publisher<sensor_msgs::msg::TimeReference>("utc");
+        events_ = publisher<versavis_msgs::msg::Event>("events", queue_depth);
+        utc_ = publisher<sensor_msgs::msg::TimeReference>("utc", queue_depth);
     }
     RCLCPP_INFO(get_logger(), "publishing %s", name.c_str());
     return {};
@@ -235,14 +236,16 @@ Expected<> Node::on_sample(const std::string& name, const ImuSample& sample) {
     const std::string base = ros_client::topic_part(name);
     if (!std::isnan(sample.data.magnetic[0])) {
         if (!imu.magnetic_fields)
-            imu.magnetic_fields = publisher<sensor_msgs::msg::MagneticField>(base + "/mag");
+            imu.magnetic_fields =
+                publisher<sensor_msgs::msg::MagneticField>(base + "/mag", imu_queue_depth);
         sensor_msgs::msg::MagneticField field;
         ros_client::fill_magnetic_field(field, sample, imu.frame_id);
         imu.magnetic_fields->publish(field);
     }
     if (!std::isnan(sample.data.temperature)) {
         if (!imu.temperatures)
-            imu.temperatures = publisher<sensor_msgs::msg::Temperature>(base + "/temperature");
+            imu.temperatures =
+                publisher<sensor_msgs::msg::Temperature>(base + "/temperature", imu_queue_depth);
         sensor_msgs::msg::Temperature temperature;
         ros_client::fill_temperature(temperature, sample, imu.frame_id);
         imu.temperatures->publish(temperature);

@@ -68,7 +68,7 @@ class Node : public rclcpp_lifecycle::LifecycleNode, private ros_client::Sink {
     std::string parameter(const std::string& name, const std::string& otherwise);
     void read_calibration(const std::string& name, Camera& camera);
     template <class Message>
-    Publisher<Message> publisher(const std::string& topic);
+    Publisher<Message> publisher(const std::string& topic, std::size_t depth);
 
     std::string instance_;
     std::optional<ros_client::StreamGroup> streams_;

@@ -3,6 +3,7 @@
 // value that is not known is an empty list.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <versavis_msgs/msg/event.hpp>
@@ -44,27 +45,34 @@ class FieldReader {
     const ring::Item& item_;
 };
 
-inline void fill_stamp(versavis_msgs::msg::Stamp& message, const Frame& frame,
-                       const std::string& frame_id) {
-    ros_client::fill_header(message, frame.time.output(), frame_id);
-    message.time_ns = frame.time.ns;
-    message.life = frame.time.life;
-    const FieldReader reader(ring::StreamKind::frames, frame);
+/// What messages of frames and events have alike.
+template <class Message>
+void fill_common(Message& message, const FieldReader& reader, const EpochTime& time,
+                 const std::string& frame_id) {
+    ros_client::fill_header(message, time.output(), frame_id);
+    message.time_ns = time.ns;
+    message.life = time.life;
     reader.read("epoch", message.epoch);
     reader.read("sigma_ns", message.sigma_ns);
     reader.read("kind", message.kind);
     reader.read("suspect", message.suspect);
+    reader.read("second_doubted", message.second_doubted);
+    reader.read("flags", message.flags);
+    reader.read("board_time_ns", message.board_time_ns);
+    reader.read("host_time_ns", message.host_time_ns);
+}
+
+inline void fill_stamp(versavis_msgs::msg::Stamp& message, const Frame& frame,
+                       const std::string& frame_id) {
+    const FieldReader reader(ring::StreamKind::frames, frame);
+    fill_common(message, reader, frame.time, frame_id);
     reader.read("holdover", message.holdover);
     reader.read("clamped", message.clamped);
     reader.read("sensor_error", message.sensor_error);
     reader.read("camera_length", message.camera_length);
-    reader.read("second_doubted", message.second_doubted);
-    reader.read("flags", message.flags);
     reader.read("trigger", message.trigger);
     reader.read("tick", message.tick);
     reader.read("block_id", message.block_id);
-    reader.read("board_time_ns", message.board_time_ns);
-    reader.read("host_time_ns", message.host_time_ns);
     reader.read("arrival_ns", message.arrival_ns);
     reader.read("camera_time_ns", message.camera_time_ns);
     reader.read("exposure_ns", message.exposure_ns);
@@ -80,24 +88,14 @@ inline void fill_stamp(versavis_msgs::msg::Stamp& message, const Frame& frame,
 
 inline void fill_event(versavis_msgs::msg::Event& message, const Event& event,
                        const std::string& frame_id) {
-    ros_client::fill_header(message, event.time.output(), frame_id);
-    message.time_ns = event.time.ns;
-    message.life = event.time.life;
     const FieldReader reader(ring::StreamKind::events, event);
-    reader.read("epoch", message.epoch);
-    reader.read("sigma_ns", message.sigma_ns);
-    reader.read("kind", message.kind);
+    fill_common(message, reader, event.time, frame_id);
     reader.read("reason", message.reason);
     reader.read("source", message.source);
     reader.read("source_name", message.source_name);
     reader.read("value", message.value);
     reader.read("expected", message.expected);
     reader.read("count", message.count);
-    reader.read("board_time_ns", message.board_time_ns);
-    reader.read("host_time_ns", message.host_time_ns);
-    reader.read("suspect", message.suspect);
-    reader.read("second_doubted", message.second_doubted);
-    reader.read("flags", message.flags);
 }
 
 }  // namespace versavis::ros2
