@@ -113,12 +113,13 @@ int serve(Service& service, Control& control, const sigset_t& signals) {
 }
 
 bool serves(const Configuration& configuration) {
-    return !configuration.cameras.empty() || !configuration.imus.empty();
+    return !configuration.cameras.empty() || !configuration.imus.empty() ||
+           !configuration.time_outputs.empty();
 }
 
 constexpr auto serves_nothing =
-    "it has no camera and no IMU, so nothing is served; add a [[camera]] with 'name' and 'device', "
-    "or an [[imu]] with 'model'";
+    "it has no camera, no IMU and no time output, so nothing is served; add a [[camera]] with "
+    "'name' and 'device', an [[imu]] with 'model', or a [[time_output]]";
 
 int check(const std::string& path, bool as_json) {
     const auto configuration = load_configuration(path);

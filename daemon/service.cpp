@@ -87,6 +87,7 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       status_(std::move(status)),
       asymmetry_(configuration.state_directory, translator_),
       alignment_(configuration.clock, board_configuration(configuration)),
+      time_announcer_(configuration.time_outputs),
       started_(host_now()) {}
 
 Expected<> Service::make_rings() {
@@ -183,7 +184,8 @@ void Service::board_synchronised() {
     asymmetry_.use(board_->report().port);
     ticks_.grid_began(host_now());
     alignment_.begin();
-    align_grid(host_now());
+    time_announcer_.begin();
+    announce(host_now());
 }
 
 void Service::board_connected() {
@@ -194,10 +196,14 @@ void Service::board_connected() {
 
 void Service::board_lost() { events_->add({EventKind::board_lost, EventReason::none, 0, "board"}); }
 
-void Service::align_grid(HostTime now) {
-    if (!alignment_.wanted() || (board_->report().capabilities & wire::capability_host_grid) == 0)
-        return;
-    if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
+/// Where the seconds lie, to the board's grid and its time outputs.
+void Service::announce(HostTime now) {
+    const std::uint32_t capabilities = board_->report().capabilities;
+    if (alignment_.wanted() && (capabilities & wire::capability_host_grid) != 0)
+        if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
+    if (time_announcer_.wanted() && (capabilities & wire::capability_time_output) != 0)
+        for (const wire::TimeOutput& message : time_announcer_.messages(now, translator_))
+            board_->announce_time(message);
 }
 
 void Service::exposure(const wire::Exposure& record, HostTime received) {
@@ -222,6 +228,7 @@ void Service::exchange_doubted(const Implausibility& doubt) {
 void Service::board_event(const wire::Event& event, HostTime received) {
     const auto doubt = event_witness_.judge(event, received);
     if (!doubt) use_pps(event);
+    if (!doubt) check_time_pulse(event, received);
     auto entry = journal_entry(event);
     if (!entry) return;
     if (doubt) {
@@ -238,6 +245,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
+    if (event.kind == wire::BoardEventKind::time_pulse)
+        entry->source_name = configuration_.time_outputs[event.source].name;
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
             if (imu->port() == event.source) {
@@ -264,10 +273,18 @@ void Service::use_pps(const wire::Event& event) {
         }
 }
 
+void Service::check_time_pulse(const wire::Event& event, HostTime received) {
+    if (event.kind != wire::BoardEventKind::time_pulse) return;
+    if (const auto error = time_announcer_.sent(event, received, translator_))
+        log(LogLevel::error, "board",
+            "a time output sent the pulse of a second {} ns off it: it is silent for a while",
+            error->ns);
+}
+
 void Service::tick() {
     const HostTime now = host_now();
     cameras_->tick(now);
-    if (board_->running()) align_grid(now);
+    if (board_->running()) announce(now);
     for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);
     clock_recorder_->tick(now);
@@ -313,6 +330,8 @@ Status Service::collect_status(HostTime now) {
     asymmetry_.keep(status.clock);
     if (const auto step = output_steps_.see(status.clock)) report_output_step(*step);
     status.grid = alignment_.report(now);
+    for (TimeOutputReport& report : time_announcer_.report(now))
+        status.time_outputs.push_back({std::move(report)});
     status.cameras = cameras_->status();
     status.streams = cameras_->streams();
     for (auto& imu : imus_) {

@@ -11,6 +11,7 @@
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
 #include "board/tick_numbers.hpp"
+#include "board/time_announcer.hpp"
 #include "camera_group.hpp"
 #include "control/control.hpp"
 #include "engine/ring/directory.hpp"
@@ -61,8 +62,11 @@ class Service final : public Controlled, private BoardListener {
 
     Expected<> make_rings();
     Expected<> make_cameras();
-    bool board_needed() const { return !imus_.empty() || cameras_->any_triggered(); }
-    void align_grid(HostTime now);
+    bool board_needed() const {
+        return !imus_.empty() || cameras_->any_triggered() || time_announcer_.wanted();
+    }
+    void announce(HostTime now);
+    void check_time_pulse(const wire::Event& event, HostTime received);
     void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
     void report_output_step(const OutputStep& step);
@@ -87,6 +91,7 @@ class Service final : public Controlled, private BoardListener {
     bool host_disciplined_ = true;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
+    TimeAnnouncer time_announcer_;
     TickNumbers ticks_;  ///< of the link's thread
     std::unique_ptr<EventJournal> events_;
     EventValidator event_witness_{translator_};

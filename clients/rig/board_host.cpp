@@ -45,6 +45,7 @@ constexpr Duration marked_ahead = milliseconds(500);
 /// Edges of the IMU's data-ready line are scheduled so long before they are due.
 constexpr Duration signalled_ahead = milliseconds(2);
 constexpr Duration ready_width = microseconds(100);
+constexpr Duration shortest_time_pulse = milliseconds(1);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
 
@@ -143,6 +144,9 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
         imu_transfer(at, transfer, received);
         return true;
     };
+    environment.uart_sent = [this](auto at, auto baud, auto bytes) {
+        truth_.add(TrueSerial{clock_->host(at), baud, {bytes.begin(), bytes.end()}});
+    };
     environment.reboot = [this](bool) { reset(); };
     if (chip_) {
         // Its time begins with it, and it says itself who it is.
@@ -185,6 +189,13 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
     pins_ = pins;
     const HostTime instant = clock_->host(at);
     if (leds_ != nullptr && (changed & pins) >> leds_->output() & 1U) leds_->pulse(instant);
+    for (auto& [pin, name, rise] : time_pins_) {
+        if ((changed >> pin & 1U) == 0) continue;
+        if ((pins >> pin & 1U) != 0)
+            rise = instant;
+        else if (instant - rise >= shortest_time_pulse)
+            truth_.add(TruePulse{name, rise, instant});
+    }
     for (GenicamCamera* camera : cameras_) {
         const unsigned output = camera->settings().output;
         if ((changed >> output & 1U) == 0) continue;

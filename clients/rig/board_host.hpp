@@ -83,6 +83,12 @@ class BoardHost {
     std::uint64_t life_ = 0;
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
+    struct TimePin {
+        unsigned pin;
+        const char* name;
+        HostTime rise;  ///< the newest
+    };
+    TimePin time_pins_[2] = {{firmware::pin_sync, "sync", {}}, {firmware::pin_test, "test", {}}};
     std::uint32_t imu_serial_ = 0;  ///< of the newest sample that was read
     HostTime signalled_{};          ///< until here edges of the data-ready line are scheduled
     std::int64_t next_utc_s_ = 0;   ///< the second that the receiver marks next; 0: the coming one

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstdio>
 
@@ -53,6 +54,16 @@ void GroundTruth::add(const TrueDeparture& d) {
 void GroundTruth::add(const TrueImuSample& s) {
     write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"serial":{},"at_ns":{}}})",
                       s.imu, s.board_life, s.serial, s.at.ns));
+}
+
+void GroundTruth::add(const TruePulse& p) {
+    write(fmt::format(R"({{"type":"pulse","output":"{}","start_ns":{},"end_ns":{}}})", p.output,
+                      p.start.ns, p.end.ns));
+}
+
+void GroundTruth::add(const TrueSerial& s) {
+    write(fmt::format(R"({{"type":"serial","at_ns":{},"baud":{},"hex":"{:02x}"}})", s.at.ns, s.baud,
+                      fmt::join(s.bytes, "")));
 }
 
 void GroundTruth::add(const Motion& motion) {

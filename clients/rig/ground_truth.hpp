@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "motion.hpp"
 #include "posix/file_descriptor.hpp"
@@ -47,6 +48,20 @@ struct TrueImuSample {
     HostTime at;
 };
 
+/// A pulse of at least 1 ms at the test or the sync output.
+struct TruePulse {
+    const char* output = "";
+    HostTime start;
+    HostTime end;
+};
+
+/// What the board sends on its serial line begins, or waits for what it sent before.
+struct TrueSerial {
+    HostTime at;
+    std::uint32_t baud = 0;
+    std::vector<std::uint8_t> bytes;
+};
+
 /// Thread-safe. Each record is one line, written immediately, since judges read along. Where a line
 /// cannot be written, the file ends and standard error says why.
 class GroundTruth {
@@ -58,6 +73,8 @@ class GroundTruth {
     void add(const TrueExposure& exposure);
     void add(const TrueDeparture& departure);
     void add(const TrueImuSample& sample);
+    void add(const TruePulse& pulse);
+    void add(const TrueSerial& serial);
     void add(const Motion& motion);
 
  private:

@@ -27,6 +27,7 @@ constexpr std::optional<EventKind> event_kind(wire::BoardEventKind kind) {
         case wire::BoardEventKind::sync_lost: return EventKind::sync_lost;
         case wire::BoardEventKind::sync_taken: return EventKind::sync_taken;
         case wire::BoardEventKind::stored: return EventKind::configuration_stored;
+        case wire::BoardEventKind::time_pulse: return EventKind::time_pulse;
     }
     return std::nullopt;
 }

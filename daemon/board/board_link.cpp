@@ -491,6 +491,8 @@ void BoardLink::stop_cameras(std::uint8_t mask) { give(wire::Stop{mask, {}}); }
 
 void BoardLink::align_grid(const wire::AlignGrid& message) { give(message); }
 
+void BoardLink::announce_time(const wire::TimeOutput& message) { give(message); }
+
 void BoardLink::announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure) {
     wire::ExpectedExposure message{};
     message.camera = static_cast<std::uint8_t>(output);

@@ -96,11 +96,15 @@ class BoardLink {
     /// The board's grid shall lie there, if it has that capability. From any thread.
     void align_grid(const wire::AlignGrid& message);
 
+    /// What a time output shall send, if the board has that capability. From any thread.
+    void announce_time(const wire::TimeOutput& message);
+
     BoardReport report() const;
     bool running() const { return accepting_; }
 
  private:
-    using Command = std::variant<wire::Start, wire::Stop, wire::ExpectedExposure, wire::AlignGrid>;
+    using Command = std::variant<wire::Start, wire::Stop, wire::ExpectedExposure, wire::AlignGrid,
+                                 wire::TimeOutput>;
 
     void run();
     bool explained() const;

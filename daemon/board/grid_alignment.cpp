@@ -17,10 +17,6 @@ constexpr Duration interval = seconds(1);
 /// With a worse clock, nothing is sent to the board.
 constexpr Duration largest_sigma = milliseconds(1);
 
-/// Readings of the output clock, one a second and each good to some ten nanoseconds, that its pace
-/// against the host's is taken from.
-constexpr std::size_t offsets_kept = 8;
-
 /// Exposures whose median is the grid's error.
 constexpr std::size_t errors_kept = 9;
 
@@ -58,25 +54,11 @@ std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Trans
                        (second->state == clock::ClockState::locked ||
                         second->state == clock::ClockState::converging);
     if (!known) return std::nullopt;
-    const double pace_ppb = std::round(pace(*second) * 1e9);
-    if (std::abs(pace_ppb) > wire::align_largest_pace_ppb) return std::nullopt;
+    const auto pace_ppb = pace_.add_ppb(*second);
+    if (!pace_ppb) return std::nullopt;
     next_ = now + interval;
     updated_ = now;
-    return wire::AlignGrid{second->board.ns, static_cast<std::int32_t>(pace_ppb), max_slew_ppb_};
-}
-
-/// Board time passes by this part faster than the output clock, which may itself be slewed against
-/// the host's.
-double GridAlignment::pace(const clock::BoardSecond& second) {
-    if (epoch_ != second.epoch) offsets_.clear();
-    epoch_ = second.epoch;
-    offsets_.push_back({second.host, Duration{second.output.ns - second.host.ns}});
-    if (offsets_.size() > offsets_kept) offsets_.pop_front();
-    const Duration span = offsets_.back().host - offsets_.front().host;
-    const Duration gained = offsets_.back().output_minus_host - offsets_.front().output_minus_host;
-    const double slewed =
-        span.ns == 0 ? 0 : static_cast<double>(gained.ns) / static_cast<double>(span.ns);
-    return 1 / ((1 + second.skew_ppm * 1e-6) * (1 + slewed)) - 1;
+    return wire::AlignGrid{second->board.ns, *pace_ppb, max_slew_ppb_};
 }
 
 void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, HostTime now) {

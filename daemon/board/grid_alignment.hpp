@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "engine/clock/translator.hpp"
+#include "output_pace.hpp"
 #include "settings/configuration.hpp"
 
 namespace versavis::daemon {
@@ -40,16 +41,10 @@ class GridAlignment {
     GridReport report(HostTime now) const;
 
  private:
-    struct Offset {
-        HostTime host;
-        Duration output_minus_host;
-    };
     struct Error {
         HostTime at;
         Duration error;
     };
-
-    double pace(const clock::BoardSecond& second);
 
     bool wanted_;
     std::uint32_t max_slew_ppb_;
@@ -57,8 +52,7 @@ class GridAlignment {
     mutable std::mutex mutex_;
     HostTime next_;
     std::optional<HostTime> updated_;
-    std::optional<std::uint32_t> epoch_;
-    std::deque<Offset> offsets_;  ///< of the last seconds, in one epoch
+    OutputPace pace_;
     std::deque<Error> errors_;
 };
 

@@ -721,6 +721,9 @@ const char* to_string(Fault fault) {
         case Fault::imu_silent: return "imu_silent";
         case Fault::imu_failed: return "imu_failed";
         case Fault::imu_faulty: return "imu_faulty";
+        case Fault::time_unknown: return "time_unknown";
+        case Fault::time_silent: return "time_silent";
+        case Fault::time_wrong: return "time_wrong";
     }
     return "";
 }
@@ -885,6 +888,26 @@ Diagnosis diagnose(const ImuStatus& imu, const Status& all) {
                    fmt::format("{:.1f} of {:g} Hz are delivered: lower 'rate_hz', or the load of "
                                "USB and board",
                                imu.delivery.rate_hz, report.rate_hz));
+}
+
+Diagnosis diagnose(const TimeOutputStatus& output, const Status& all) {
+    const TimeOutputReport& report = output.report;
+    const auto because = [&](Fault fault) {
+        return conclude(fault, report.hint, report.pulses > 0, young(all.started, all.now));
+    };
+    const Fault cause = all.board_diagnosis.fault;
+    if (cut_off(cause))
+        return conclude(cause,
+                        "after 'holdover_s' its sentences say that the time is not known: see the "
+                        "board's hint",
+                        report.pulses > 0, young(all.started, all.now));
+    switch (report.state) {
+        case TimeOutputState::waiting: return because(Fault::time_unknown);
+        case TimeOutputState::silent: return because(Fault::time_silent);
+        case TimeOutputState::wrong: return because(Fault::time_wrong);
+        case TimeOutputState::sending: break;
+    }
+    return {};
 }
 
 }  // namespace versavis::daemon

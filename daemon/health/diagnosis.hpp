@@ -13,6 +13,7 @@ namespace versavis::daemon {
 struct Status;
 struct CameraStatus;
 struct ImuStatus;
+struct TimeOutputStatus;
 
 enum class Health {
     ok,
@@ -72,8 +73,12 @@ enum class Fault {
     imu_silent,
     imu_failed,
     imu_faulty,
+    // Of a time output.
+    time_unknown,
+    time_silent,
+    time_wrong,
 };
-constexpr Fault last_fault = Fault::imu_faulty;
+constexpr Fault last_fault = Fault::time_wrong;
 const char* to_string(Fault fault);  ///< its word in the status; empty: none
 
 struct Diagnosis {
@@ -88,6 +93,7 @@ Diagnosis diagnose_board(const Status& status);
 Diagnosis diagnose_clock(const Status& status);
 Diagnosis diagnose(const CameraStatus& camera, const Status& status);
 Diagnosis diagnose(const ImuStatus& imu, const Status& status);
+Diagnosis diagnose(const TimeOutputStatus& output, const Status& status);
 
 /// Of a part that failed, one sentence.
 std::string describe_failure(const ImuReport& imu);

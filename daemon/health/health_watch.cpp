@@ -103,6 +103,11 @@ void HealthWatch::examine(Status& status) {
         imu.diagnosis = diagnose(imu, status);
         date("imu " + imu.report.name, "", imu.diagnosis, status.now);
     }
+    for (TimeOutputStatus& output : status.time_outputs) {
+        output.diagnosis = diagnose(output, status);
+        date("time " + output.report.name, to_string(output.report.state), output.diagnosis,
+             status.now);
+    }
 }
 
 void HealthWatch::measure(CameraStatus& camera, const Status& status) {

@@ -26,6 +26,8 @@ std::vector<std::pair<std::string, const Diagnosis*>> diagnoses(const Status& st
     for (const CameraStatus& camera : status.cameras)
         all.emplace_back(camera.name, &camera.diagnosis);
     for (const ImuStatus& imu : status.imus) all.emplace_back(imu.report.name, &imu.diagnosis);
+    for (const TimeOutputStatus& output : status.time_outputs)
+        all.emplace_back(output.report.name, &output.diagnosis);
     return all;
 }
 
@@ -269,6 +271,17 @@ std::string to_json(const Status& status) {
                             {"filter_delay_source", imu::to_string(imu.report.filter.source)},
                             {"last_sample_ns", imu.report.last_sample.ns}},
                            imu.diagnosis));
+    json time_outputs = json::array();
+    for (const TimeOutputStatus& output : status.time_outputs) {
+        const TimeOutputReport& report = output.report;
+        time_outputs.push_back(
+            with_diagnosis({{"name", report.name},
+                            {"state", to_string(report.state)},
+                            {"pulses", report.pulses},
+                            {"utc_s", report.pulses != 0 ? json(report.utc_s) : json(nullptr)},
+                            {"error_ns", report.error ? json(report.error->ns) : json(nullptr)}},
+                           output.diagnosis));
+    }
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
         streams.push_back({{"name", stream.name},
@@ -290,6 +303,7 @@ std::string to_json(const Status& status) {
         {"clock", with_diagnosis(clock_json(status.clock, status.grid), status.clock_diagnosis)},
         {"cameras", cameras},
         {"imus", imus},
+        {"time_outputs", time_outputs},
         {"streams", streams}};
     // Names from devices may hold anything; what is no UTF-8 is replaced.
     return document.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -7,6 +7,7 @@
 
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
+#include "board/time_announcer.hpp"
 #include "camera/camera.hpp"
 #include "delivery.hpp"
 #include "diagnosis.hpp"
@@ -35,6 +36,11 @@ struct ImuStatus {
     Diagnosis diagnosis{};
 };
 
+struct TimeOutputStatus {
+    TimeOutputReport report;
+    Diagnosis diagnosis{};
+};
+
 struct StreamStatus {
     std::string name;
     std::string kind;
@@ -58,6 +64,7 @@ struct Status {
     GridReport grid;
     std::vector<CameraStatus> cameras;
     std::vector<ImuStatus> imus;
+    std::vector<TimeOutputStatus> time_outputs;
     std::vector<StreamStatus> streams;
 };
 

@@ -52,6 +52,9 @@ bool possible(const wire::ImuSample& message) {
 bool possible(const wire::Event& message) {
     if (!in_life(message.time_ns)) return false;
     switch (message.kind) {
+        case wire::BoardEventKind::time_pulse:
+            return message.source < wire::time_output_count && message.value >= 0 &&
+                   message.value <= latest_label_s;
         case wire::BoardEventKind::utc_label:
             return message.value >= 0 && message.value <= latest_label_s;
         case wire::BoardEventKind::triggers_skipped: return message.detail > 0;

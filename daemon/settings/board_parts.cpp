@@ -75,6 +75,7 @@ class Needs {
     void of_imu(const ImuConfiguration& imu);
     void of_light(const IlluminationConfiguration& light);
     void of_ports(const PortConfiguration& ports);
+    void of_time_output(const TimeOutputConfiguration& output);
     void of_board(const BoardConfiguration& board);
 
     std::vector<Need> take() { return std::move(needs_); }
@@ -181,6 +182,25 @@ void Needs::of_ports(const PortConfiguration& ports) {
              "set sync_rate_hz = 0, or use another board");
 }
 
+void Needs::of_time_output(const TimeOutputConfiguration& output) {
+    const auto need = [&](std::uint32_t part, const char* key, std::string asks, std::string what,
+                          std::string there, const char* cure) {
+        needs_.push_back({part, Part::ports, 0, &output.entry, key, std::move(asks),
+                          std::move(what), std::move(there), cure});
+    };
+    const std::string& name = output_name(output.output);
+    const bool trigger = output.output != wire::test_at_test && output.output != wire::test_at_sync;
+    const std::uint32_t part =
+        trigger ? wire::present_camera0 << (output.output - unsigned{wire::test_at_camera0})
+                : std::uint32_t{output.output == wire::test_at_test ? wire::present_test_output
+                                                                    : wire::present_sync_output};
+    need(part, "output", fmt::format("is \"{}\"", name), "output " + name,
+         trigger ? outputs_there(present_) : "", "choose another output, or use another board");
+    if (!output.sentences.empty())
+        need(wire::present_uart, "sentences", fmt::format("is {}", output.sentences), "UART", "",
+             "set sentences = [], or use another board");
+}
+
 void Needs::of_board(const BoardConfiguration& board) {
     if (board.keep_configuration)
         needs_.push_back({wire::present_memory, Part::ports, 0, &board.entry, "keep_configuration",
@@ -196,6 +216,8 @@ std::vector<Need> needs_of(const Configuration& configuration, std::uint32_t pre
     for (const ImuConfiguration& imu : configuration.imus) needs.of_imu(imu);
     needs.of_light(configuration.illumination);
     needs.of_ports(configuration.ports);
+    for (const TimeOutputConfiguration& output : configuration.time_outputs)
+        needs.of_time_output(output);
     return needs.take();
 }
 
@@ -249,6 +271,9 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
         return lacks(configuration.clock.entry, "align", "moving its grid");
     if (configuration.ports.nmea && !has(capabilities, wire::capability_nmea))
         return lacks(configuration.ports.entry, "nmea", "NMEA");
+    if (!configuration.time_outputs.empty() && !has(capabilities, wire::capability_time_output))
+        return configuration.time_outputs.front().entry.reference("name") +
+               ": the board's firmware has no time outputs; update it, or remove the table";
     return "";
 }
 

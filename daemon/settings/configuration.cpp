@@ -104,6 +104,8 @@ void read_tables_below(TableReader& reader, CameraConfiguration& camera) {
 
 void read_tables_below(TableReader& /*reader*/, ImuConfiguration& /*imu*/) {}
 
+void read_tables_below(TableReader& /*reader*/, TimeOutputConfiguration& /*output*/) {}
+
 /// What follows from other keys where a key is not there.
 void complete(CameraConfiguration& camera) {
     const auto open = [&](const char* key) { return !camera.entry.has(key); };
@@ -203,6 +205,7 @@ Expected<Configuration, TomlProblems> read_configuration(const toml::table& root
     read_parts(file, top, "imu", configuration.imus);
     read_part(top, "illumination", configuration.illumination);
     read_part(top, "ports", configuration.ports);
+    read_parts(file, top, "time_output", configuration.time_outputs);
     read_part(top, "memory", configuration.memory);
     top.finish();
     configuration.entry = top.entry();
@@ -243,6 +246,12 @@ std::optional<std::uint8_t> test_source(const Configuration& configuration) {
         if (imu.name == configuration.ports.test)
             return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
     return std::nullopt;
+}
+
+const std::string& output_name(std::uint8_t test_output) {
+    return std::find_if(test_outputs.begin(), test_outputs.end(),
+                        [&](const auto& known) { return known.second == test_output; })
+        ->first;
 }
 
 double test_pulse_rate_hz(const Configuration& configuration) {

@@ -14,6 +14,7 @@
 #include "engine/imu/imu_model.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "engine/toml/problem.hpp"
+#include "time_output_model.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 #include "wire/limits.hpp"
@@ -187,6 +188,28 @@ struct PortConfiguration {
     double pulse_us = 100;
 };
 
+/// The sentences of a time output, in the order of the board's bits.
+inline const std::vector<std::string> time_sentence_names{"RMC", "GGA", "ZDA"};
+
+/// The time for a LiDAR: pulses at whole seconds, and sentences that name them.
+struct TimeOutputConfiguration {
+    TomlEntry entry;
+    std::string name = "lidar";
+    const TimeOutputModel* model = &time_output_models().front();
+    std::uint8_t output = wire::test_at_test;  ///< as `test_output`
+    double pulse_ms = 50;
+    bool pulse_inverted = false;
+    double delay_us = 0;  ///< from the second to the pulse
+    std::vector<std::string> sentences{"RMC"};
+    std::string talker = "GP";
+    unsigned baud = 9600;
+    std::optional<bool> serial_inverted;  ///< none: as the model has it
+    double sentence_delay_ms = 60;        ///< from the pulse to the first sentence
+    unsigned holdover_s = 30;
+
+    bool inverts_serial() const { return serial_inverted.value_or(model->serial_inverted); }
+};
+
 struct MemoryConfiguration {
     TomlEntry entry;
     bool lock = false;    ///< all of the service's memory, rings included, stays in RAM
@@ -205,6 +228,7 @@ struct Configuration {
     std::vector<ImuConfiguration> imus;
     IlluminationConfiguration illumination;
     PortConfiguration ports;
+    std::vector<TimeOutputConfiguration> time_outputs;
     MemoryConfiguration memory;
 };
 
@@ -222,6 +246,9 @@ const ImuConfiguration* find_imu_at(const Configuration& configuration, std::int
 
 /// What the test pulses show, as the board has it; none: there is nothing of the name of `test`.
 std::optional<std::uint8_t> test_source(const Configuration& configuration);
+
+/// The name of an output in `test_outputs`.
+const std::string& output_name(std::uint8_t test_output);
 
 /// Rate of the test pulses; 0: there are none.
 double test_pulse_rate_hz(const Configuration& configuration);

@@ -13,7 +13,9 @@
 #include "camera_preset.hpp"
 #include "device_name.hpp"
 #include "engine/pairing/pairing.hpp"
+#include "findings.hpp"
 #include "receive_mode.hpp"
+#include "time_output_check.hpp"
 
 namespace versavis::daemon {
 
@@ -25,56 +27,6 @@ constexpr double longest_arrival_without_clock_ms = 900;
 constexpr double fastest_on_grid_hz = wire::limits::fastest_imu_without_data_ready_millihertz / 1e3;
 constexpr double slowest_test_hz = wire::limits::slowest_test_millihertz / 1e3;
 constexpr double slowest_sync_hz = wire::limits::slowest_sync_uhz / 1e6;
-
-class Findings {
- public:
-    explicit Findings(TomlProblems& problems) : problems_(problems) {}
-
-    void add(const TomlEntry& entry, const std::string& key, const std::string& what,
-             const std::string& cure, const TomlRange& range = {}) {
-        TomlProblem found = entry.problem(key, what, cure);
-        found.range = range;
-        const auto same_place = [&](const TomlProblem& known) {
-            return known.place.path == found.place.path && known.place.line == found.place.line &&
-                   known.place.column == found.place.column && known.key == found.key;
-        };
-        if (std::none_of(problems_.begin(), problems_.end(), same_place))
-            problems_.push_back(std::move(found));
-    }
-
-    /// Refuses a value above what another key leaves.
-    void limit(const TomlEntry& entry, const std::string& key, double value, double maximum,
-               const std::string& reason, const std::string& cure) {
-        if (value > maximum)
-            add(entry, key,
-                fmt::format("'{}' is {}, but must be at most {} ({})", key, quantity(key, value),
-                            quantity(key, maximum), reason),
-                cure, TomlRange{std::nullopt, maximum});
-    }
-
- private:
-    TomlProblems& problems_;
-};
-
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-/// The entry in words, with its line, and with its file if a message about `seen_from` has another.
-std::string at_line(const TomlEntry& entry, const TomlEntry& seen_from) {
-    const std::string line = fmt::format("{} on line {}", entry.title, entry.place.line);
-    return entry.place.path == seen_from.place.path ? line : line + " of " + entry.place.path;
-}
-
-/// Reports each that agrees with one before it, with the first of them.
-template <class Entry, class Same, class Report>
-void find_repeated(const std::vector<Entry>& entries, Same same, Report report) {
-    for (auto second = entries.begin(); second != entries.end(); ++second) {
-        const auto first =
-            std::find_if(entries.begin(), second, [&](const Entry& e) { return same(e, *second); });
-        if (first != second) report(*first, *second);
-    }
-}
 
 /// Names become names of files.
 bool valid_name(const std::string& name) {
@@ -150,6 +102,8 @@ void check_names(const Configuration& configuration, Findings& findings) {
     std::vector<NamedEntry> all;
     for (const auto& camera : configuration.cameras) all.push_back({camera.entry, camera.name});
     for (const auto& imu : configuration.imus) all.push_back({imu.entry, imu.name});
+    for (const auto& output : configuration.time_outputs)
+        all.push_back({output.entry, output.name});
     const std::vector<std::string> taken{"clock", "events", "status"};
     for (const auto& [entry, name] : all) {
         const std::size_t stem = name.size() - std::min(name.size(), evidence_suffix.size());
@@ -614,7 +568,8 @@ constexpr void (*rules[])(const Configuration&, Findings&){
     check_imus,        check_illumination,
     check_inputs,      check_uart_and_imu_output,
     check_test_rate,   check_pulse_outputs,
-    check_history,     check_receive};
+    check_history,     check_receive,
+    check_time_outputs};
 
 }  // namespace
 

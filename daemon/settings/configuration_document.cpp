@@ -20,7 +20,7 @@ namespace {
 constexpr const char* features = "features";
 
 /// Arrays of tables, each of which has a name of its own.
-constexpr std::string_view named_tables[]{"camera", "imu"};
+constexpr std::string_view named_tables[]{"camera", "imu", "time_output"};
 
 /// Tables that only the board needs, which is configured anew.
 constexpr std::string_view live_tables[]{"illumination", "ports"};
@@ -49,8 +49,11 @@ std::set<std::string> keys_of(const toml::table& before, const toml::table& afte
 }
 
 std::string name_of(const toml::table& table, std::string_view kind) {
-    // The only IMU may do without.
-    return table["name"].value_or(std::string(kind == "imu" ? ImuConfiguration().name : ""));
+    // The only one of these may do without.
+    std::string usual;
+    if (kind == "imu") usual = ImuConfiguration().name;
+    if (kind == "time_output") usual = TimeOutputConfiguration().name;
+    return table["name"].value_or(usual);
 }
 
 /// The tables of an array by their names.

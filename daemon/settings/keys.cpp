@@ -523,6 +523,40 @@ const Keys<PortConfiguration>& keys<PortConfiguration>() {
 }
 
 template <>
+const Keys<TimeOutputConfiguration>& keys<TimeOutputConfiguration>() {
+    using Output = TimeOutputConfiguration;
+    std::vector<std::pair<std::string, const TimeOutputModel*>> models;
+    for (const TimeOutputModel& model : time_output_models())
+        models.emplace_back(model.name, &model);
+    constexpr double ns_per_ms = 1e6;
+    constexpr double longest_delay_us = limits::longest_time_delay_ns / ns_per_us;
+    static const Keys<Output> all{
+        {"name", plain(&Output::name, "a name, unique"), "its name in status and events"},
+        {"model", choice(&Output::model, models), "what is connected"},
+        {"output", choice(&Output::output, test_outputs).within("test, sync, trigger0 to trigger3"),
+         "where the pulses leave"},
+        {"pulse_ms",
+         number(&Output::pulse_ms, limits::shortest_time_pulse_ns / ns_per_ms,
+                limits::longest_time_pulse_ns / ns_per_ms),
+         "width of the pulses"},
+        {"pulse_inverted", flag(&Output::pulse_inverted), "the pulses are low"},
+        {"delay_us", number(&Output::delay_us, -longest_delay_us, longest_delay_us).within("-10^5 to 10^5"),
+         "from the second to the pulse; negative: before it"},
+        {"sentences", plain(&Output::sentences, "some of RMC, GGA, ZDA").usually("`[\"RMC\"]`"),
+         "that follow each pulse; empty: only pulses"},
+        {"talker", plain(&Output::talker, "two letters"), "that begins them, as in `$GPRMC`"},
+        {"baud", number(&Output::baud, limits::slowest_time_baud, limits::fastest_time_baud),
+         "of the sentences"},
+        {"serial_inverted", flag(&Output::serial_inverted).usually("by model"),
+         "the line rests low, as RS-232 does"},
+        {"sentence_delay_ms", number(&Output::sentence_delay_ms, 0, limits::last_sentence_ms),
+         "from the pulse to the first sentence"},
+        {"holdover_s", number(&Output::holdover_s, 1, limits::longest_holdover_s),
+         "how long the board goes on without the service"}};
+    return all;
+}
+
+template <>
 const Keys<MemoryConfiguration>& keys<MemoryConfiguration>() {
     using Memory = MemoryConfiguration;
     static const Keys<Memory> all{
@@ -542,6 +576,7 @@ void for_each_table(Visit visit) {
     visit("[[imu]]", keys<ImuConfiguration>());
     visit("[illumination]", keys<IlluminationConfiguration>());
     visit("[ports]", keys<PortConfiguration>());
+    visit("[[time_output]]", keys<TimeOutputConfiguration>());
     visit("[memory]", keys<MemoryConfiguration>());
 }
 
@@ -559,6 +594,7 @@ template void read_keys(TableReader&, AutoExposureConfiguration&);
 template void read_keys(TableReader&, ImuConfiguration&);
 template void read_keys(TableReader&, IlluminationConfiguration&);
 template void read_keys(TableReader&, PortConfiguration&);
+template void read_keys(TableReader&, TimeOutputConfiguration&);
 template void read_keys(TableReader&, MemoryConfiguration&);
 
 std::vector<KeyDescription> describe_keys() {

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "imu/imu_output.hpp"
+#include "port_settings.hpp"
 
 namespace versavis::firmware {
 
@@ -37,13 +38,7 @@ constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
     wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
-    wire::capability_nmea;
-
-unsigned test_output(const wire::PortConfiguration& ports) {
-    if (ports.test_output == wire::test_at_test) return output_test;
-    return ports.test_output == wire::test_at_sync ? output_sync
-                                                   : ports.test_output - wire::test_at_camera0;
-}
+    wire::capability_nmea | wire::capability_time_output;
 
 /// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. If lower,
 /// contacts that bounce count double.
@@ -62,6 +57,7 @@ Board::Board(const Hal& hal, const Identity& identity)
       sync_(outputs_),
       test_(outputs_),
       noise_(hal_.edges),
+      time_outputs_{{outputs_, hal_.imu_uart}, {outputs_, hal_.imu_uart}},
       light_(outputs_, *this),
       uart_imu_(1, hal_.imu_uart, *this),
       spi_imu_(0, hal_.imu_bus, *this),
@@ -112,6 +108,7 @@ void Board::poll_cameras(Nanoseconds now) {
     light_.poll(now, settled_);
     sync_.poll(now);
     test_.poll(now);
+    poll_time_outputs(now);
 }
 
 /// When cameras, light and outputs have something to do if nothing stirs them before.
@@ -125,6 +122,7 @@ Nanoseconds Board::find_timers() const {
     if (outputs_blocked_) return wake;
     sooner(sync_.next_wake());
     sooner(test_.next_wake());
+    for (const TimeOutput& each : time_outputs_) sooner(each.next_wake());
     sooner(outputs_.next_wake());
     return wake;
 }
@@ -165,6 +163,7 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     wire::ClockRequest request;
     wire::ExpectedExposure expected;
     wire::AlignGrid alignment;
+    wire::TimeOutput time;
     wire::Reboot reboot;
     if (packet.read(hello)) return greet(hello);
     // A host that asks another life of this board for the time learns of this one at once. Nothing
@@ -177,6 +176,7 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     if (packet.read(begin)) return start(begin);
     if (packet.read(end)) return stop(end.cameras);
     if (packet.read(alignment)) return align(alignment);
+    if (packet.read(time)) return take(time);
     if (packet.read(expected)) {
         if (expected.camera < camera_count && expected.exposure_ns >= 0)
             cameras_[expected.camera].announce(expected.trigger, expected.exposure_ns);
@@ -255,6 +255,7 @@ void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus sta
 }
 
 void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
+    release_time_outputs(configuration);
     apply_imus(configuration, now);
     configuration_ = configuration;
     apply_nmea();
@@ -274,7 +275,8 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
         cameras_[i].configure(configuration.cameras[i],
                               lit ? configuration.illumination.lead_ns : 0);
         // Before any trigger, and not so soon that a port whose words take time is late.
-        outputs_.rest(i, cameras_[i].trigger_inverted(), now + OutputQueue::horizon);
+        if (!is_time_output(i))
+            outputs_.rest(i, cameras_[i].trigger_inverted(), now + OutputQueue::horizon);
         if (cameras_[i].has_strobe()) inputs |= 1U << i;
         if (cameras_[i].is_slave())
             masters_ = static_cast<std::uint8_t>(masters_ | 1U << cameras_[i].master());
@@ -331,8 +333,9 @@ void Board::begin_trains(Nanoseconds now) {
     if (ports.sync_rate_uhz != 0)
         sync_.begin(output_sync, Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
     if (ports.test == wire::test_rate)
-        test_.begin(test_output(ports), Grid(0, std::int64_t{ports.test_rate_millihertz} * 1000),
-                    board_clock_, ports.pulse_ns, now);
+        test_.begin(output_of(ports.test_output),
+                    Grid(0, std::int64_t{ports.test_rate_millihertz} * 1000), board_clock_,
+                    ports.pulse_ns, now);
     const bool paced = (configuration_.imus[0].options & wire::imu_data_ready) == 0;
     if (ports.test == wire::test_imu0 && paced &&
         configuration_.imus[0].kind != wire::ImuKind::none)
@@ -386,10 +389,8 @@ void Board::align(const wire::AlignGrid& wanted) {
                                wanted.pace_ppb <= wire::align_largest_pace_ppb;
     const bool slew_possible =
         wanted.max_slew_ppb > 0 && wanted.max_slew_ppb <= wire::align_largest_slew_ppb;
-    if (!in_reach || !pace_possible || !slew_possible) {
-        ++health_.ignored;
-        return send(wire::Log{wire::LogLevel::warning, "align_grid is out of range: ignored"});
-    }
+    if (!in_reach || !pace_possible || !slew_possible)
+        return ignore({wire::LogLevel::warning, "align_grid is out of range: ignored"});
     const Nanoseconds off = grid_clock_.misplaced(wanted.board_ns);
     if (any_running() || (off <= unseen_step && -off <= unseen_step)) {
         grid_clock_.align(wanted.board_ns, wanted.pace_ppb, wanted.max_slew_ppb, now);
@@ -397,6 +398,11 @@ void Board::align(const wire::AlignGrid& wanted) {
     }
     grid_clock_.place(wanted.board_ns, wanted.pace_ppb);
     begin_trains(now);
+}
+
+void Board::ignore(const wire::Log& why) {
+    ++health_.ignored;
+    send(why);
 }
 
 void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
@@ -458,6 +464,7 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
     if (gate) light_.moved(level, asked, left);
     // The gate closes as soon as it can, which is no sooner than the port can.
     if (!late || (gate && !level)) return;
+    for (TimeOutput& each : time_outputs_) each.late(output);
     ++health_.late_outputs;
     event(wire::BoardEventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked,
           0);
@@ -466,8 +473,8 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
 void Board::poll_configuration(Nanoseconds now) {
     if (!all_idle() && now < configure_at_) return;
     light_.stop(now);
-    outputs_.rest(output_sync, false, now);
-    outputs_.rest(output_test, false, now);
+    for (const unsigned output : {output_sync, output_test})
+        if (!is_time_output(output)) outputs_.rest(output, false, now);
     if (!outputs_.empty()) return;
     configuring_ = false;
     apply(wanted_, now);

@@ -15,6 +15,7 @@
 #include "output_queue.hpp"
 #include "pps_monitor.hpp"
 #include "pulse_train.hpp"
+#include "time_output.hpp"
 #include "transmitter.hpp"
 
 namespace versavis::firmware {
@@ -80,6 +81,12 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void start_cameras(std::uint8_t cameras, std::uint8_t flags);
     void stop(std::uint8_t cameras);
     void align(const wire::AlignGrid& wanted);
+    void ignore(const wire::Log& why);
+    void take(const wire::TimeOutput& message);
+    bool possible(const wire::TimeOutput& message, Nanoseconds now) const;
+    bool is_time_output(unsigned output) const;
+    void poll_time_outputs(Nanoseconds now);
+    void release_time_outputs(const wire::Configuration& configuration);
     void switch_slaves();
     void edges_lost(std::uint32_t lines);
     void follow_sync(Nanoseconds at);
@@ -127,6 +134,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     wire::Configuration configuration_{};  ///< in force
     wire::Configuration wanted_;           ///< waits for the last pulses and exposures to end
     PpsMonitor pps_;
+    TimeOutput time_outputs_[wire::time_output_count];
     EdgeOrder waiting_;  ///< edges of exposure lines, for another line to settle
     Illumination light_;
     Vn100 uart_imu_;

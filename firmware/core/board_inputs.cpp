@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The part of the board that handles what arrives at its pins.
 #include "board.hpp"
+#include "port_settings.hpp"
 
 namespace versavis::firmware {
 
@@ -8,7 +9,6 @@ namespace {
 
 constexpr Nanoseconds default_sync_period = 1'000'000'000;
 constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: two crystals differ by less
-constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
 /// Bounds the work of one poll. If lower, a burst of edges takes more polls; if higher, other work
@@ -183,9 +183,8 @@ void Board::follow_sync(Nanoseconds at) {
 
 void Board::apply_nmea() {
     if ((configuration_.ports.options & wire::port_nmea) == 0) return;
-    const std::uint32_t baud = configuration_.ports.nmea_baud;
-    nmea_.begin(baud == 0 ? default_nmea_baud : baud);
-    hal_.imu_uart.set_baud(baud == 0 ? default_nmea_baud : baud);
+    nmea_.begin(nmea_baud(configuration_.ports));
+    hal_.imu_uart.set_baud(nmea_baud(configuration_.ports));
 }
 
 void Board::poll_nmea() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// UART (PL011): characters that take their real time. The levels within a character are not shown.
+// UART (PL011): characters that take their real time, bit by bit at the transmitter's pin.
 //
 // uart.on_byte = (byte, cycle) => ...: what the chip sent, at the end of its stop bit.
 // uart.send(bytes, at, baud): what somebody sends to it, from the cycle `at` on; at another speed
@@ -53,6 +53,8 @@ export class Uart {
         this.clock.cancel(this.event);
         this.clock.cancel(this.timeout);
         this.event = undefined;
+        this.clock.cancel(this.next_bit);
+        this.tx_level = true;
         this.update_line();
         this.pins.drive();
     }
@@ -84,6 +86,7 @@ export class Uart {
         if ((this.values[0x30] & 0x101) !== 0x101) return;
         const byte = this.tx.shift();
         this.signal(false);
+        this.send_bits(byte);
         const cycles = Math.round(this.frame_bits * this.bit_cycles);
         this.event = this.clock.after(cycles, () => {
             this.event = undefined;
@@ -92,6 +95,23 @@ export class Uart {
             this.begin();
             this.update_line();
         });
+    }
+
+    /// Start bit, data from the lowest bit on, stop bits; a parity bit is not modelled.
+    send_bits(byte) {
+        const begin = this.clock.now;
+        const bits = (byte << 1) | 0xe00;
+        const show = (number) => {
+            this.tx_level = ((bits >>> number) & 1) !== 0;
+            this.pins.drive();
+            let next = number + 1;
+            while (next < 10 && ((bits >>> next) & 1) === ((bits >>> number) & 1)) ++next;
+            this.next_bit =
+                next === 10
+                    ? undefined
+                    : this.clock.at(begin + Math.round(next * this.bit_cycles), () => show(next));
+        };
+        show(0);
     }
 
     send(bytes, at = this.clock.now, baud = undefined) {
@@ -214,7 +234,10 @@ export class Uart {
 export class UartPins {
     constructor(uarts) {
         this.uarts = uarts;
-        this.out = pins_that((gpio) => (gpio & 3) === 0);
+    }
+
+    get out() {
+        return this.uarts.reduce((all, uart) => (uart.tx_level ? all | uart.tx_pins : all), 0);
     }
 
     get enable() {

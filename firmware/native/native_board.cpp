@@ -318,6 +318,9 @@ void NativeBoard::Uart::set_baud(std::uint32_t baud) {
     board.baud_ = baud;
 }
 
+/// Bytes are bytes here, however their bits are sent.
+void NativeBoard::Uart::invert_transmitter(bool /*inverted*/) { board.spend(); }
+
 void NativeBoard::Uart::write(const std::uint8_t* data, std::size_t size) {
     board.spend();
     if (board.environment_.uart_sent)

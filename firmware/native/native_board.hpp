@@ -125,6 +125,7 @@ class NativeBoard final : public VirtualBoard,
     struct Uart final : ImuUart {
         explicit Uart(NativeBoard& of) : board(of) {}
         void set_baud(std::uint32_t baud) override;
+        void invert_transmitter(bool inverted) override;
         void write(const std::uint8_t* data, std::size_t size) override;
         std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
         NativeBoard& board;

@@ -105,6 +105,9 @@ struct TapedImuUart final : Taped<ImuUart, Tape> {
     void set_baud(std::uint32_t baud) override {
         this->call("imu_uart.set_baud", &ImuUart::set_baud, baud);
     }
+    void invert_transmitter(bool inverted) override {
+        this->call("imu_uart.invert_transmitter", &ImuUart::invert_transmitter, inverted);
+    }
     void write(const std::uint8_t* data, std::size_t size) override {
         this->call("imu_uart.write", &ImuUart::write, data, size);
     }

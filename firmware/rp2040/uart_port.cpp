@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "uart_port.hpp"
 
+#include <utility>
+
 #include "clocks.hpp"
 #include "pins.hpp"
 #include "state_machine.hpp"
@@ -27,6 +29,7 @@ void UartPort::set_up() {
 }
 
 void UartPort::set_baud(std::uint32_t baud) {
+    if (std::exchange(baud_, baud) == baud) return;
     constexpr std::uint32_t bits_8_with_fifo = 3U << 5U | 1U << 4U;
     constexpr std::uint32_t on = 1U << 0U | 1U << 8U | 1U << 9U;
     restart_blocks(reset_uart0);
@@ -37,6 +40,11 @@ void UartPort::set_baud(std::uint32_t baud) {
     uart0().levels = 0;  // an interrupt for each four bytes
     uart0().control = on;
     uart0().interrupt_mask = uart_received | uart_paused;
+}
+
+void UartPort::invert_transmitter(bool inverted) {
+    set_function(pin_uart_transmit, function_uart, override_none,
+                 inverted ? override_invert : override_none);
 }
 
 void UartPort::write(const std::uint8_t* data, std::size_t size) {

@@ -15,6 +15,7 @@ class UartPort final : public firmware::ImuUart {
     void set_up();
 
     void set_baud(std::uint32_t baud) override;
+    void invert_transmitter(bool inverted) override;
     void write(const std::uint8_t* data, std::size_t size) override;
     std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
 
@@ -35,6 +36,7 @@ class UartPort final : public firmware::ImuUart {
 
     BoardClock& clock_;
     WakeFlag& wake_flag_;
+    std::uint32_t baud_ = 0;
     volatile std::uint32_t arrived_ = 0;  ///< bytes, modulo 2^32
     volatile std::uint32_t read_ = 0;
     volatile std::uint32_t ended_ = 0;  ///< chunks

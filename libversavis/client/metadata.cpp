@@ -45,6 +45,7 @@ const char* to_string(EventKind kind) {
         case EventKind::configuration_stored: return "configuration_stored";
         case EventKind::seconds_differ: return "seconds_differ";
         case EventKind::host_undisciplined: return "host_undisciplined";
+        case EventKind::time_pulse: return "time_pulse";
     }
     return "unknown";
 }

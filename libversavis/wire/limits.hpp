@@ -32,4 +32,25 @@ inline constexpr std::uint32_t fastest_sync_uhz = 10'000'000;
 inline constexpr std::uint32_t slowest_nmea_baud = 1'200;
 inline constexpr std::uint32_t fastest_nmea_baud = 921'600;
 
+inline constexpr std::int64_t time_reach_ns = 10'000'000'000;
+/// What the two digits of a sentence's year can say: 2000 to 2099.
+inline constexpr std::int64_t first_utc_s = 946'684'800;
+inline constexpr std::int64_t last_utc_s = 4'102'444'799;
+inline constexpr std::int32_t longest_time_delay_ns = 100'000'000;
+inline constexpr std::uint32_t shortest_time_pulse_ns = 1'000'000;
+inline constexpr std::uint32_t longest_time_pulse_ns = 500'000'000;
+inline constexpr std::uint32_t longest_holdover_s = 3'600;
+/// After the pulse, by when the last sentence has ended: receivers take what comes later for that
+/// of the next pulse.
+inline constexpr std::uint32_t last_sentence_ms = 900;
+inline constexpr std::uint32_t slowest_time_baud = 4'800;
+inline constexpr std::uint32_t fastest_time_baud = 115'200;
+
+/// So many sentences of the greatest length that NMEA 0183 allows take at most so long.
+constexpr std::uint32_t sentences_last_ms(std::uint32_t count, std::uint32_t baud) {
+    constexpr std::uint32_t characters = 82;
+    constexpr std::uint32_t bits_a_character = 10;
+    return count * characters * bits_a_character * 1000 / baud + 1;
+}
+
 }  // namespace versavis::wire::limits

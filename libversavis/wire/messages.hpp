@@ -48,6 +48,7 @@ enum Capability : std::uint32_t {
     capability_imu_output = 1U << 7U,
     capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
     capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART label the pulses of the PPS input
+    capability_time_output = 1U << 10U,  ///< it sends pulses and NMEA sentences itself
 };
 
 /// What a board has pins and peripherals for.
@@ -174,6 +175,8 @@ enum class BoardEventKind : std::uint8_t {
     sync_lost = 15,   ///< pulses of the sync input do not fit the grid; value: ns off it
     sync_taken = 16,  ///< the grid follows the sync pulses (again); value: ns that it moves
     stored = 17,      ///< the configuration to store; value: 1 when it is safe, 0 when that failed
+    time_pulse = 18,  ///< a time output sent the pulse of this second; source: its index; value:
+                      ///< UTC seconds since 1970
 };
 
 enum class SkipReason : std::uint16_t {
@@ -311,6 +314,42 @@ inline constexpr std::int64_t align_reach_ns = 100'000'000'000;
 inline constexpr std::int32_t align_largest_pace_ppb = 500'000;
 inline constexpr std::uint32_t align_largest_slew_ppb = 1'000'000;
 
+inline constexpr std::size_t time_output_count = 2;
+
+enum TimeOutputFlag : std::uint8_t {
+    time_known = 1U << 0U,            ///< else it is not known what time it is: sentences say so
+    time_pulse_inverted = 1U << 1U,   ///< pulses are low
+    time_serial_inverted = 1U << 2U,  ///< the line is high for a 0 and at rest low, as RS-232 is
+};
+
+/// The sentences that follow a pulse, in this order.
+enum TimeSentence : std::uint8_t {
+    sentence_rmc = 1U << 0U,
+    sentence_gga = 1U << 1U,
+    sentence_zda = 1U << 2U,
+};
+inline constexpr unsigned time_sentence_count = 3;
+
+/// Where the second `utc_s` begins, and what to make of it: a pulse at each whole second, and NMEA
+/// sentences that say which one it was. The host repeats it each second.
+struct TimeOutput {
+    static constexpr Type type = Type::time_output;
+    std::int64_t board_ns;            ///< at most 10 s from now
+    std::int64_t utc_s;               ///< seconds of UTC since 1970, without leap seconds
+    std::int32_t pace_ppb;            ///< how much faster board time passes than UTC
+    std::int32_t delay_ns;            ///< from the second to the pulse
+    std::uint32_t pulse_ns;           ///< width
+    std::uint32_t baud;               ///< of the sentences; 0: only pulses
+    std::uint16_t holdover_s;         ///< without another message the board goes on for so long
+    std::uint16_t sentence_delay_ms;  ///< from the pulse to the first sentence
+    std::uint8_t index;               ///< which of the board's time outputs
+    std::uint8_t output;              ///< where the pulses leave, as TestOutput
+    std::uint8_t flags;               ///< bits of TimeOutputFlag
+    std::uint8_t sentences;           ///< bits of TimeSentence
+    char talker[2];                   ///< as in "GP" of "$GPRMC"
+    std::uint8_t reserved[2];
+};
+
 /// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first;
 /// afterwards all do. Four neighbouring gaps that are not all equal occur only once in all of the
 /// patterns, so that five frames identify their triggers, and show when the cables of two cameras
@@ -331,7 +370,7 @@ static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event)
 static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 &&
               sizeof(ClockFollowUp) == 16 && sizeof(Health) == 96 && sizeof(Log) == 96);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
-              sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16);
+              sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16 && sizeof(TimeOutput) == 48);
 
 struct PayloadSize {
     Type type;
@@ -356,6 +395,7 @@ inline constexpr PayloadSize payload_sizes[] = {
     {ExpectedExposure::type, sizeof(ExpectedExposure)},
     {Reboot::type, sizeof(Reboot)},
     {AlignGrid::type, sizeof(AlignGrid)},
+    {TimeOutput::type, sizeof(TimeOutput)},
 };
 
 /// Size of the payload of `type`, or 0 when the type is unknown.

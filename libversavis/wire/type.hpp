@@ -12,7 +12,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 namespace versavis::wire {
 
 inline constexpr std::uint8_t protocol_major = 3;
-inline constexpr std::uint8_t protocol_minor = 0;
+inline constexpr std::uint8_t protocol_minor = 1;
 inline constexpr std::size_t camera_count = 4;
 
 /// `no_time` in a time field: the instant was not observed.
@@ -37,6 +37,7 @@ enum class Type : std::uint8_t {
     expected_exposure = 0x86,
     reboot = 0x87,
     align_grid = 0x88,
+    time_output = 0x89,
 };
 
 }  // namespace versavis::wire

@@ -273,6 +273,9 @@ function uart() {
     poke(made, uart0 + 0x30, 0x301);
     const sent = [];
     made.uart[0].on_byte = (byte, cycle) => sent.push([byte, cycle]);
+    const levels = [];
+    made.watch([0]);
+    made.on_output = ({ cycle, levels: word }) => levels.push([word & 1, cycle]);
     const { now } = made;
     for (const byte of [65, 66, 67]) poke(made, uart0, byte);
     check('it is busy', (peek(made, uart0 + 0x18) >>> 3) & 1, 1);
@@ -283,6 +286,16 @@ function uart() {
         sent,
         [65, 66, 67].map((byte, i) => [byte, now + (i + 1) * character]),
     );
+    // Of 'A', 0x41: start, 1 0 0 0 0 0 1 0 from the lowest bit on, stop.
+    const at = (bits) => now + Math.round((bits * character) / 10);
+    check('its bits', levels.slice(0, 6), [
+        [0, now],
+        [1, at(1)],
+        [0, at(2)],
+        [1, at(7)],
+        [0, at(8)],
+        [1, at(9)],
+    ]);
     const begin = made.now + 100;
     made.uart[0].send([1, 2, 3, 4, 5], begin, 115200);
     poke(made, uart0 + 0x38, 0x50);

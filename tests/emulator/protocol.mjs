@@ -125,6 +125,23 @@ export class Host {
         this.send(0x87, Uint8Array.of(0x42, 0x4f, 0x4f, 0x54, to_boot_loader ? 1 : 0, 0, 0, 0));
     }
 
+    /// A time output at the test output; `board` and `pulse` in ns.
+    time_output({ board, utc, pace = 0, pulse, baud, sentences, flags }) {
+        const payload = new Uint8Array(48);
+        const view = new DataView(payload.buffer);
+        view.setBigInt64(0, BigInt(board), true);
+        view.setBigInt64(8, BigInt(utc), true);
+        view.setInt32(16, pace, true);
+        view.setUint32(24, pulse, true);
+        view.setUint32(28, baud, true);
+        view.setUint16(32, 30, true); // s of holdover
+        view.setUint16(34, 60, true); // ms from pulse to sentence
+        view.setUint8(38, flags);
+        view.setUint8(39, sentences);
+        payload.set(Buffer.from('GP'), 40);
+        this.send(0x89, payload);
+    }
+
     /// `cameras` by their output; `imus` [{kind, options, rate_mhz}]; `light`, `ports`.
     configure({ id = 1, store = false, cameras = {}, imus = [], light = {}, ports = {} }) {
         const payload = new Uint8Array(256);

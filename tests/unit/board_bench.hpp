@@ -16,7 +16,10 @@ namespace versavis::firmware {
 
 struct BenchUart final : ImuUart {
     void set_baud(std::uint32_t wanted) override { baud = wanted; }
-    void write(const std::uint8_t* /*data*/, std::size_t /*size*/) override {}
+    void invert_transmitter(bool wanted) override { inverted = wanted; }
+    void write(const std::uint8_t* data, std::size_t size) override {
+        sent.append(reinterpret_cast<const char*>(data), size);
+    }
     std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override {
         const std::size_t size = std::min(capacity, bytes.size());
         std::copy_n(bytes.begin(), size, data);
@@ -26,6 +29,8 @@ struct BenchUart final : ImuUart {
     }
 
     std::uint32_t baud = 0;
+    bool inverted = false;
+    std::string sent;
     std::vector<std::uint8_t> bytes;
     Nanoseconds until = 0;  ///< when the last byte has arrived
     Nanoseconds byte = 0;   ///< how long one takes

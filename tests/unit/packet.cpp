@@ -60,6 +60,25 @@ Configuration example_configuration() {
     return configuration;
 }
 
+TimeOutput example_time_output() {
+    TimeOutput message{};
+    message.board_ns = 7'000'000'250;
+    message.utc_s = 1'798'761'600;
+    message.pace_ppb = -25'000;
+    message.delay_ns = 12'500;
+    message.pulse_ns = 50'000'000;
+    message.baud = 9'600;
+    message.holdover_s = 30;
+    message.sentence_delay_ms = 60;
+    message.index = 1;
+    message.output = test_at_sync;
+    message.flags = time_known | time_serial_inverted;
+    message.sentences = sentence_rmc | sentence_gga;
+    message.talker[0] = 'G';
+    message.talker[1] = 'P';
+    return message;
+}
+
 /// The line "name: bytes" of the test vectors in the protocol document.
 std::string documented(const std::string& name) {
     std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/contracts/wire-protocol.md");
@@ -71,7 +90,7 @@ std::string documented(const std::string& name) {
 }  // namespace
 
 TEST_CASE("packet: the test vectors of the document") {
-    CHECK(hex(encoded(HostHello{3, 0, {}}, 0x11223344, 0)) == documented("host-hello"));
+    CHECK(hex(encoded(HostHello{3, 1, {}}, 0x11223344, 0)) == documented("host-hello"));
     CHECK(hex(encoded(example_exposure(), 0xA1B2C3D4, 5)) == documented("exposure"));
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
@@ -81,6 +100,7 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(Start{0b0101, start_pattern, {}}, 0x11223344, 4)) == documented("start"));
     CHECK(hex(encoded(AlignGrid{7'000'000'250, -25'000, 20'000}, 0x11223344, 5)) ==
           documented("align-grid"));
+    CHECK(hex(encoded(example_time_output(), 0x11223344, 6)) == documented("time-output"));
     CHECK(hex(encoded(Event{BoardEventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
           documented("event"));
     CHECK(hex(encoded(example_configuration(), 0x11223344, 1)) == documented("configuration"));

@@ -100,6 +100,7 @@ struct Uart final : ImuUart {
         baud = wanted;
         bauds.push_back(wanted);
     }
+    void invert_transmitter(bool /*inverted*/) override {}
     void write(const std::uint8_t* data, std::size_t size) override {
         CHECK(size <= 80);
         sent.emplace_back(data, data + size);

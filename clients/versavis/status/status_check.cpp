@@ -46,7 +46,7 @@ std::vector<Device> devices(const json& status) {
     std::vector<Device> all;
     for (const char* part : {"board", "clock"})
         if (status.contains(part)) all.push_back({part, &status[part], false});
-    for (const char* kind : {"cameras", "imus"})
+    for (const char* kind : {"cameras", "imus", "time_outputs"})
         if (status.contains(kind))
             for (const json& device : status[kind])
                 all.push_back({device.value("name", ""), &device, true});

@@ -15,7 +15,7 @@ using nlohmann::json;
 enum class Type { gauge, counter };
 
 /// Where the key of a family is, and what labels its samples.
-enum class Part { top, board, clock, camera, imu, stream };
+enum class Part { top, board, clock, camera, imu, time_output, stream };
 
 struct Family {
     std::string_view name;  ///< without the _total of counters; the unit is its end
@@ -102,6 +102,10 @@ constexpr Family families[] = {
      "Published samples with a failed check."},
     {"versavis_imu_samples_doubted", "", Type::counter, Part::imu, "doubted", 1,
      "Samples withheld: implausible number, time or flags."},
+    {"versavis_time_output_pulses", "", Type::counter, Part::time_output, "pulses", 1,
+     "Seconds of UTC that the board gave a pulse."},
+    {"versavis_time_output_error_seconds", "seconds", Type::gauge, Part::time_output, "error_ns",
+     1e9, "By how much the newest pulse left after its second."},
     {"versavis_stream_items", "", Type::counter, Part::stream, "items", 1, "Items published."},
 };
 
@@ -218,6 +222,7 @@ const char* kind_of(Part part) {
     switch (part) {
         case Part::camera: return "cameras";
         case Part::imu: return "imus";
+        case Part::time_output: return "time_outputs";
         case Part::stream: return "streams";
         case Part::board: return "board";
         default: return "clock";
@@ -228,6 +233,7 @@ const char* label_of(Part part) {
     switch (part) {
         case Part::camera: return "camera";
         case Part::imu: return "imu";
+        case Part::time_output: return "time_output";
         default: return "stream";
     }
 }
@@ -247,7 +253,7 @@ template <class Use>
 void for_each_device(const json& status, Use use) {
     for (const char* name : {"board", "clock"})
         if (status.contains(name)) use(status[name], std::string(name));
-    for (const char* kind : {"cameras", "imus"})
+    for (const char* kind : {"cameras", "imus", "time_outputs"})
         for (const json& device : status.value(kind, json::array()))
             use(device, device.value("name", ""));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "status/status_view.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -129,6 +130,19 @@ std::string imu_lines(const json& imu, Detail detail, Hints& hints) {
                                  in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source")));
     return wrapped_part(line) + hints.of(imu, text(imu, "name")) +
            (detail == Detail::full ? filter : "");
+}
+
+std::string time_output_lines(const json& output, Hints& hints) {
+    std::string line = fmt::format("{:<8} {:<10} ", text(output, "name"), text(output, "state"));
+    const json utc_s = output.value("utc_s", json());
+    if (utc_s.is_number_integer())
+        line += fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(utc_s.get<std::int64_t>()));
+    else
+        line += "no pulse yet";
+    if (output.value("error_ns", json()).is_number())
+        line += fmt::format(", {} us off", in_us(output, "error_ns"));
+    line += fmt::format(", {} pulses", count(output, "pulses"));
+    return wrapped_part(line) + hints.of(output, text(output, "name"));
 }
 
 /// What is taken off the middle of its exposures, before it is known: nothing.
@@ -301,6 +315,8 @@ std::string status_text(const json& status, Detail detail, Colour colour) {
         add(camera, camera_lines(camera, detail, hints));
     for (const json& imu : status.value("imus", json::array()))
         add(imu, imu_lines(imu, detail, hints));
+    for (const json& output : status.value("time_outputs", json::array()))
+        add(output, time_output_lines(output, hints));
     if (detail == Detail::summary) return out;
     for (const json& stream : status.value("streams", json::array()))
         out +=

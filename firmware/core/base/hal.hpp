@@ -179,11 +179,13 @@ struct ImuBus {
     ~ImuBus() = default;
 };
 
-/// Asynchronous serial line of the second IMU, 8N1. At least 256 bytes wait; later ones are lost.
+/// Asynchronous serial line, 8N1: the second IMU, or a GNSS receiver and time outputs. At least 256 bytes wait; later ones are lost.
 /// Board::poll() is called when bytes have arrived.
 struct ImuUart {
-    /// Bytes that are under way may be lost.
+    /// Bytes that are under way may be lost, unless the speed is what it was.
     virtual void set_baud(std::uint32_t baud) = 0;
+    /// From now on the transmitter's line is low at rest, as RS-232 has it, or high, as at first.
+    virtual void invert_transmitter(bool inverted) = 0;
     /// At most 80 bytes; what still waits to be sent is sent first.
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
     /// `received` is when the last of the bytes had arrived, to four characters. One call never

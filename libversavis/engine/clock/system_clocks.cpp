@@ -49,6 +49,8 @@ class KernelClocks final : public SystemClocks {
         state.synchronised = (kernel.status & STA_UNSYNC) == 0;
         state.max_error = microseconds(kernel.maxerror);
         state.tai_offset_s = kernel.tai;
+        if ((kernel.status & STA_INS) != 0) state.leap_s = 1;
+        if ((kernel.status & STA_DEL) != 0) state.leap_s = -1;
         return state;
     }
 

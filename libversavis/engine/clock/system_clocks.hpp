@@ -17,6 +17,7 @@ struct KernelState {
     bool synchronised = false;
     Duration max_error;             ///< of CLOCK_REALTIME
     std::int32_t tai_offset_s = 0;  ///< TAI minus UTC; 0: never set in the kernel
+    int leap_s = 0;                 ///< that UTC gains at the end of its day, or loses: 1, -1
     int error = 0;                  ///< why only the offset can be read, as errno; 0: all can
 };
 

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What LiDARs accept as pulse and sentence; docs/user/lidar.md has the sources.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace versavis::daemon {
+
+struct TimeOutputModel {
+    std::string name;
+    bool serial_inverted;  ///< its input has the levels of RS-232
+    double shortest_pulse_ms;
+    double longest_pulse_ms;
+    std::vector<std::string> sentences;  ///< of which it reads one; empty: any
+    std::vector<unsigned> bauds;         ///< empty: any
+    double earliest_sentence_ms;         ///< begin of the first, after the pulse's begin
+    double latest_begin_ms;              ///< the same
+    double latest_end_ms;                ///< end of the last
+    bool after_pulse;                    ///< they end after the pulse
+};
+
+/// "generic" first.
+const std::vector<TimeOutputModel>& time_output_models();
+
+}  // namespace versavis::daemon
