@@ -328,4 +328,7 @@ TEST_CASE("board_parts: what an older firmware cannot do is named by its key") {
           "8:8: 'nmea' of [ports] is true: the board's firmware does not support NMEA; update it, "
           "or set nmea = false");
     CHECK(missing_capability(load_parts(left_section), 0).empty());
+    CHECK(from_place(missing_capability(load_parts("[[time_output]]\n"), 0)) ==
+          "1:1: 'name' of [[time_output]]: the board's firmware has no time outputs; update it, or "
+          "remove the table");
 }

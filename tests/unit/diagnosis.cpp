@@ -608,6 +608,25 @@ TEST_CASE("diagnosis: of an IMU: nobody answers, another part does, it is silent
     check_fault(bench.imu(), Fault::too_slow, "100.0 of 200 Hz");
 }
 
+TEST_CASE("diagnosis: of a time output: the time is not known, or pulses are missing or wrong") {
+    DiagnosisBench bench;
+    bench.board();
+    TimeOutputStatus output;
+    output.report.pulses = 5;
+    const auto diagnosed = [&](TimeOutputState state) {
+        output.report.state = state;
+        output.report.hint = "why";
+        return diagnose(output, bench.status);
+    };
+    CHECK(diagnosed(TimeOutputState::sending).health == Health::ok);
+    check_fault(diagnosed(TimeOutputState::waiting), Fault::time_unknown, "why");
+    check_fault(diagnosed(TimeOutputState::silent), Fault::time_silent, "why");
+    check_fault(diagnosed(TimeOutputState::wrong), Fault::time_wrong, "why");
+    bench.status.board.state = BoardState::absent;
+    bench.board();
+    check_fault(diagnosed(TimeOutputState::waiting), Fault::board_gone, "after 'holdover_s'");
+}
+
 namespace {
 
 std::string text_of(const char* name) {

@@ -58,7 +58,8 @@ TEST_CASE(
                                                           "sync_taken",
                                                           "configuration_stored",
                                                           "seconds_differ",
-                                                          "host_undisciplined", "time_pulse"});
+                                                          "host_undisciplined",
+                                                          "time_pulse"});
 }
 
 TEST_CASE("metadata: each reason has its name, and none that is no longer used") {

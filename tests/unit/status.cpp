@@ -99,6 +99,26 @@ TEST_CASE("status: each device has health, state, fault, since when, and what to
     CHECK(document["cameras"][0]["fault"] == "");
 }
 
+TEST_CASE("status: what a time output sent last, if anything") {
+    Status status = healthy();
+    CHECK(nlohmann::json::parse(to_json(status))["time_outputs"].empty());
+    status.time_outputs.push_back({{"roof", TimeOutputState::waiting, "", 0, 0, {}}});
+    auto output = nlohmann::json::parse(to_json(status))["time_outputs"][0];
+    CHECK(output["name"] == "roof");
+    CHECK(output["state"] == "waiting");
+    CHECK(output["utc_s"].is_null());
+    CHECK(output["error_ns"].is_null());
+    status.time_outputs[0].report = {"roof",        TimeOutputState::sending, "", 7, 1'798'761'600,
+                                     Duration{-250}};
+    output = nlohmann::json::parse(to_json(status))["time_outputs"][0];
+    CHECK(output["pulses"] == 7);
+    CHECK(output["utc_s"] == 1'798'761'600);
+    CHECK(output["error_ns"] == -250);
+    CHECK(output["health"] == "ok");
+    status.time_outputs[0].diagnosis = {Health::degraded, Fault::time_silent, "", {}};
+    CHECK(health(status) == Health::degraded);
+}
+
 TEST_CASE("status: how packets are received, once that is decided") {
     Status status = healthy();
     const auto receive = [&] {

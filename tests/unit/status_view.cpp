@@ -34,6 +34,21 @@ TEST_CASE("status_view: keys of the clock that are not known yet are shown by th
     CHECK(clock_text(json::object()).empty());
 }
 
+TEST_CASE("status_view: a time output shows the newest second and its error") {
+    json status = json::parse(R"({"instance": "a", "health": "ok", "time_outputs": [
+        {"name": "roof", "state": "sending", "health": "ok", "fault": "", "hint": "", "pulses": 7,
+         "utc_s": 1798761600, "error_ns": -250}]})");
+    const auto shown = [&] { return status_text(status, Detail::summary, Colour::none); };
+    CHECK_THAT(shown(),
+               Contains("roof     sending    2027-01-01 00:00:00 UTC, -0.2 us off, 7 pulses"));
+    status["time_outputs"][0]["utc_s"] = nullptr;
+    status["time_outputs"][0]["error_ns"] = nullptr;
+    status["time_outputs"][0]["state"] = "waiting";
+    status["time_outputs"][0]["hint"] = "the board's clock is not known yet";
+    CHECK_THAT(shown(), Contains("roof     waiting    no pulse yet") &&
+                            Contains("the board's clock is not known yet"));
+}
+
 namespace {
 
 /// Four cameras and an IMU, all of which have been through trouble, and have the same hint, as long

@@ -179,8 +179,8 @@ struct ImuBus {
     ~ImuBus() = default;
 };
 
-/// Asynchronous serial line, 8N1: the second IMU, or a GNSS receiver and time outputs. At least 256 bytes wait; later ones are lost.
-/// Board::poll() is called when bytes have arrived.
+/// Asynchronous serial line, 8N1: the second IMU, or a GNSS receiver and time outputs. At least 256
+/// bytes wait; later ones are lost. Board::poll() is called when bytes have arrived.
 struct ImuUart {
     /// Bytes that are under way may be lost, unless the speed is what it was.
     virtual void set_baud(std::uint32_t baud) = 0;

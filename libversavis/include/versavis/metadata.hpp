@@ -123,7 +123,7 @@ enum class EventKind : std::uint32_t {
     seconds_differ = 29,      ///< value: whole seconds of the receiver at the board less the host's
     host_undisciplined = 30,  ///< the clock that names the PPS pulses' seconds; value: 1, or 0 when
                               ///< it is disciplined again
-    time_pulse = 31,  ///< a time output sent the pulse of this second; value: UTC seconds since 1970
+    time_pulse = 31,  ///< a time output sent a second's pulse; value: UTC seconds since 1970
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
