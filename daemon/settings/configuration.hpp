@@ -196,7 +196,7 @@ struct TimeOutputConfiguration {
     TomlEntry entry;
     std::string name = "lidar";
     const TimeOutputModel* model = &time_output_models().front();
-    std::uint8_t output = wire::test_at_test;  ///< as `test_output`
+    std::uint8_t output = wire::test_at_sync;  ///< as `test_output`
     double pulse_ms = 50;
     bool pulse_inverted = false;
     double delay_us = 0;  ///< from the second to the pulse

@@ -33,11 +33,11 @@ TEST_CASE("time_output_check: the board must have what it needs") {
     check_time(
         "[[time_output]]\n",
         {{"", accepted},
-         {"output = 'sync'\n[ports]\nsync_rate_hz = 1\n",
-          "2:10: the output 'sync' is already used by 'sync_rate_hz' of [ports]; choose "
+         {"[ports]\nsync_rate_hz = 1\n",
+          "1:1: the output 'sync' is already used by 'sync_rate_hz' of [ports]; choose "
           "another output"},
-         {"[[imu]]\n[ports]\ntest = 'imu0'\n",
-          "1:1: the output 'test' is already used by 'test' of [ports]; choose another "
+         {"output = 'test'\n[[imu]]\n[ports]\ntest = 'imu0'\n",
+          "2:10: the output 'test' is already used by 'test' of [ports]; choose another "
           "output"},
          {"output = 'sync'\n[ports]\ntest_rate_hz = 10\ntest_output = 'sync'\n",
           "2:10: the output 'sync' is already used by 'test_rate_hz' of [ports]; choose "
@@ -61,17 +61,17 @@ TEST_CASE("time_output_check: the board must have what it needs") {
 TEST_CASE("time_output_check: two of them share nothing but the line") {
     const std::string first = "[[time_output]]\nname = 'a'\n";
     check_time(first,
-               {{"[[time_output]]\nname = 'b'\noutput = 'sync'\nsentences = []\n", accepted},
+               {{"[[time_output]]\nname = 'b'\noutput = 'test'\nsentences = []\n", accepted},
                 {"[[time_output]]\nname = 'b'\nsentences = []\n",
-                 "3:1: the output 'test' is already used by [[time_output]] \"a\" on line 1; "
+                 "3:1: the output 'sync' is already used by [[time_output]] \"a\" on line 1; "
                  "choose another output, or connect both LiDARs to that one"},
-                {"[[time_output]]\nname = 'b'\noutput = 'sync'\n",
+                {"[[time_output]]\nname = 'b'\noutput = 'test'\n",
                  "3:1: the board has one serial line, already used by [[time_output]] \"a\" "
                  "on line 1; set sentences = []: both LiDARs can listen to that line"},
-                {"[[time_output]]\nname = 'a'\noutput = 'sync'\nsentences = []\n",
+                {"[[time_output]]\nname = 'a'\noutput = 'test'\nsentences = []\n",
                  "4:8: the name 'a' is already used by [[time_output]] \"a\" on line 1; "
                  "choose another name"}});
-    CHECK_THAT(time_errors(first + "[[time_output]]\nname = 'b'\noutput = 'sync'\nsentences = []\n"
+    CHECK_THAT(time_errors(first + "[[time_output]]\nname = 'b'\noutput = 'test'\nsentences = []\n"
                                    "[[time_output]]\nname = 'c'\noutput = 'trigger0'\n"
                                    "sentences = []\n"),
                Catch::StartsWith("8:8: the board has 2 time outputs; connect several LiDARs to one "
