@@ -20,6 +20,7 @@
 #include "commands/doctor_command.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
+#include "commands/lidar_command.hpp"
 #include "commands/list.hpp"
 #include "commands/monitor_commands.hpp"
 #include "commands/process_command.hpp"
@@ -182,6 +183,8 @@ int main(int argc, char** argv) {
 
     client::CameraCommands camera(app);
 
+    client::LidarCommand lidar(app, [] { return stop_requested != 0; });
+
     client::ControlCommands control(app);
 
     client::ProcessCommand process(app, [] { return stop_requested != 0; });
@@ -209,7 +212,7 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     // Commands that run until they are stopped end tidily; all others end at once.
-    if (watch || *tail_command || clock.records() || board.chosen() || evaluate.chosen() ||
+    if (watch || *tail_command || clock.records() || board.chosen() || lidar.chosen() || evaluate.chosen() ||
         process.chosen() || verify.chosen() || files.chosen() || recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     signal(SIGXFSZ, SIG_IGN);  // a limit on files is reported like a full disk
@@ -235,6 +238,7 @@ int main(int argc, char** argv) {
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
+    if (lidar.chosen()) return lidar.run();
     if (control.chosen()) return control.run(instance);
     if (discover.chosen()) return discover.run(instance);
     if (recorder.chosen()) return recorder.run(instance);
