@@ -212,8 +212,9 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     // Commands that run until they are stopped end tidily; all others end at once.
-    if (watch || *tail_command || clock.records() || board.chosen() || lidar.chosen() || evaluate.chosen() ||
-        process.chosen() || verify.chosen() || files.chosen() || recorder.chosen())
+    if (watch || *tail_command || clock.records() || board.chosen() || lidar.chosen() ||
+        evaluate.chosen() || process.chosen() || verify.chosen() || files.chosen() ||
+        recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     signal(SIGXFSZ, SIG_IGN);  // a limit on files is reported like a full disk
     if (*status)
