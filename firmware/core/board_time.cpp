@@ -81,8 +81,9 @@ bool Board::possible(const wire::TimeOutput& message, Nanoseconds now) const {
 
 void Board::take(const wire::TimeOutput& message) {
     const Nanoseconds now = hal_.clock.now();
-    if (!configuring_ && possible(message, now))
+    if (possible(message, now))
         return time_outputs_[message.index].take(message, output_of(message.output), now);
+    if (message.index < wire::time_output_count) time_outputs_[message.index].doubt();
     ignore({wire::LogLevel::warning, "time_output is out of range or taken: ignored"});
 }
 

@@ -30,11 +30,13 @@ constexpr unsigned bits_a_character = 10;
 
 void TimeOutput::take(const wire::TimeOutput& message, unsigned output, Nanoseconds now) {
     set_up(message, output, now);
-    if ((message.flags & wire::time_known) == 0) {
-        heard_ = false;
-        return distrust();
-    }
+    if ((message.flags & wire::time_known) == 0) return doubt();
     follow(message, now);
+}
+
+void TimeOutput::doubt() {
+    heard_ = false;
+    distrust();
 }
 
 void TimeOutput::release() {

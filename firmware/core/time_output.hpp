@@ -21,6 +21,9 @@ class TimeOutput {
     /// Pulses leave at `output` from now on; the message is within its limits.
     void take(const wire::TimeOutput& message, unsigned output, Nanoseconds now);
 
+    /// The time is no longer known.
+    void doubt();
+
     /// Its output and its line belong to others from now on.
     void release();
 

@@ -148,6 +148,7 @@ class Trial {
     Nanoseconds connects_ = 0;       ///< the host does, then
     Nanoseconds trusted_from_ = 0;   ///< the host calls the time known
     Nanoseconds stalled_until_ = 0;  ///< the board's code
+    bool wrong_ = false;             ///< the newest message
     bool leapt_ = false;
 };
 
@@ -217,7 +218,9 @@ void Trial::announce(Nanoseconds now) {
     if (task_.leap_utc_s != 0 && !leapt_)
         message.holdover_s = static_cast<std::uint16_t>(
             std::clamp<std::int64_t>(task_.leap_utc_s - 3 - utc_s, 1, message.holdover_s));
-    if (random_.one_of(200)) {  // a lie, alone
+    // One that is wrong is never followed by another: two that agree are what the board believes.
+    wrong_ = random_.one_of(200) && !wrong_;
+    if (wrong_) {
         if (random_.one_of(2))
             message.utc_s += random_.one_of(2) ? 1 : -1;
         else

@@ -108,6 +108,38 @@ TEST_CASE("time_output: what is out of range, or taken, is ignored and said") {
     CHECK(bench.all<wire::Log>().size() == 1);
 }
 
+TEST_CASE("time_output: a message that says nothing of the time ends the pulses, at any moment") {
+    const std::function<void(BoardBench&)> ends[] = {
+        [](BoardBench& bench) {
+            wire::TimeOutput unknown = message_of(0);
+            unknown.flags = 0;
+            bench.send(unknown);
+        },
+        [](BoardBench& bench) { bench.send(message_of(900 * second)); },  // out of range
+        [](BoardBench& bench) {  // while the board waits for the last pulse of a configuration
+            wire::TimeOutput unknown = message_of(0);
+            unknown.flags = 0;
+            bench.queue(bench.configuration);
+            bench.queue(unknown);
+            bench.run(bench.port.time);
+        },
+        [](BoardBench& bench) { bench.send(message_of(4 * second, first_s + 7)); },
+    };
+    for (const auto& end : ends) {
+        BoardBench bench;
+        bench.send(message_of(2 * second));
+        bench.send(message_of(3 * second, first_s + 1));
+        bench.run(3500 * ms);
+        CHECK(changes(bench).size() == 6);
+        bench.port.uart.sent.clear();
+        end(bench);
+        bench.run(5500 * ms);
+        CHECK(changes(bench).size() == 6);
+        CHECK(bench.port.uart.sent.find(",A,") == std::string::npos);
+        CHECK(bench.port.uart.sent.find("$GPRMC,,V,") != std::string::npos);
+    }
+}
+
 TEST_CASE("time_output: a configuration leaves it alone, or takes what it needs") {
     BoardBench bench;
     wire::TimeOutput message = message_of(2 * second);
