@@ -201,7 +201,7 @@ void Service::announce(HostTime now) {
     const std::uint32_t capabilities = board_->report().capabilities;
     if (alignment_.wanted() && (capabilities & wire::capability_host_grid) != 0)
         if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
-    if (time_announcer_.wanted() && (capabilities & wire::capability_time_output) != 0)
+    if ((capabilities & wire::capability_time_output) != 0)
         for (const wire::TimeOutput& message : time_announcer_.messages(now, translator_))
             board_->announce_time(message);
 }
@@ -245,7 +245,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
-    if (event.kind == wire::BoardEventKind::time_pulse)
+    if (event.kind == wire::BoardEventKind::time_pulse &&
+        event.source < configuration_.time_outputs.size())
         entry->source_name = configuration_.time_outputs[event.source].name;
     if (source == EventSource::imu) {
         for (auto& imu : imus_)

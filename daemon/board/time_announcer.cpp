@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/rounding.hpp"
 #include "wire/limits.hpp"
@@ -87,6 +88,7 @@ TimeAnnouncer::TimeAnnouncer(const std::vector<TimeOutputConfiguration>& outputs
 void TimeAnnouncer::begin() {
     const std::lock_guard lock(mutex_);
     next_ = {};
+    begins_ = true;
     epoch_.reset();
 }
 
@@ -125,9 +127,13 @@ std::string TimeAnnouncer::find_second(HostTime now, clock::Translator& translat
 
 std::vector<wire::TimeOutput> TimeAnnouncer::messages(HostTime now, clock::Translator& translator) {
     const std::lock_guard lock(mutex_);
+    std::vector<wire::TimeOutput> all;
+    if (std::exchange(begins_, false))
+        for (std::size_t unused = outputs_.size(); unused < wire::time_output_count; ++unused)
+            all.emplace_back().index = static_cast<std::uint8_t>(unused);
     // The output clock is read each time: a step of it must reach the board before its next pulse.
     const bool stepped = epoch_ && *epoch_ != translator.output_now().epoch;
-    if (outputs_.empty() || (now < next_ && !stepped)) return {};
+    if (outputs_.empty() || (now < next_ && !stepped)) return all;
     next_ = now + interval;
     Second second;
     const bool was_known = unknown_.empty();
@@ -136,7 +142,6 @@ std::vector<wire::TimeOutput> TimeAnnouncer::messages(HostTime now, clock::Trans
         known_since_ = now;
         known_from_ = second.at.board;
     }
-    std::vector<wire::TimeOutput> all;
     for (const Output& output : outputs_) {
         wire::TimeOutput message = output.settings;
         if (unknown_.empty()) {

@@ -44,6 +44,7 @@ class TimeAnnouncer {
     void begin();
 
     /// What to send to the board now: once a second, and at once when the time is no longer known.
+    /// The first ones of a connection also end what an earlier service used.
     std::vector<wire::TimeOutput> messages(HostTime now, clock::Translator& translator);
 
     /// The board sent a pulse. Returns by how much it was off, if that is wrong.
@@ -74,6 +75,7 @@ class TimeAnnouncer {
     std::optional<std::uint32_t> epoch_;
     HostTime settled_;  ///< from then on the time of this epoch is trusted
     HostTime next_;
+    bool begins_ = true;                                  ///< nothing was sent by this connection
     std::string unknown_ = "the board is not connected";  ///< why the time is; empty: it is known
     HostTime known_since_;
     BoardTime known_from_;  ///< pulses from here on are of this epoch

@@ -255,7 +255,7 @@ void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus sta
 }
 
 void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
-    release_time_outputs(configuration);
+    release_time_outputs(configuration, now);
     apply_imus(configuration, now);
     configuration_ = configuration;
     apply_nmea();

@@ -86,7 +86,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     bool possible(const wire::TimeOutput& message, Nanoseconds now) const;
     bool is_time_output(unsigned output) const;
     void poll_time_outputs(Nanoseconds now);
-    void release_time_outputs(const wire::Configuration& configuration);
+    void release_time_outputs(const wire::Configuration& configuration, Nanoseconds now);
     void switch_slaves();
     void edges_lost(std::uint32_t lines);
     void follow_sync(Nanoseconds at);

@@ -81,6 +81,8 @@ bool Board::possible(const wire::TimeOutput& message, Nanoseconds now) const {
 
 void Board::take(const wire::TimeOutput& message) {
     const Nanoseconds now = hal_.clock.now();
+    if (message.index < wire::time_output_count && message.pulse_ns == 0)
+        return time_outputs_[message.index].release(now);
     if (possible(message, now))
         return time_outputs_[message.index].take(message, output_of(message.output), now);
     if (message.index < wire::time_output_count) time_outputs_[message.index].doubt();
@@ -94,13 +96,13 @@ bool Board::is_time_output(unsigned output) const {
 }
 
 /// Those whose output or line the new configuration needs.
-void Board::release_time_outputs(const wire::Configuration& configuration) {
+void Board::release_time_outputs(const wire::Configuration& configuration, Nanoseconds now) {
     for (unsigned output = 0; output < output_count; ++output)
         for (TimeOutput& each : time_outputs_)
             if (each.uses(output) &&
                 (is_taken(configuration, output) ||
                  (each.sends_sentences() && !has_line(configuration, each.baud()))))
-                each.release();
+                each.release(now);
 }
 
 void Board::poll_time_outputs(Nanoseconds now) {

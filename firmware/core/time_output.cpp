@@ -39,7 +39,12 @@ void TimeOutput::doubt() {
     distrust();
 }
 
-void TimeOutput::release() {
+void TimeOutput::release(Nanoseconds now) {
+    if (!configured_) return;
+    outputs_.rest(output_, false, now + OutputQueue::horizon);
+    if (settings_.baud != 0 && (settings_.flags & wire::time_serial_inverted) != 0)
+        uart_.invert_transmitter(false);
+    settings_ = {};
     configured_ = heard_ = trusted_ = false;
     pulse_ = {};
     send_at_ = never;

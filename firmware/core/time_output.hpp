@@ -25,7 +25,7 @@ class TimeOutput {
     void doubt();
 
     /// Its output and its line belong to others from now on.
-    void release();
+    void release(Nanoseconds now);
 
     bool uses(unsigned output) const { return configured_ && output_ == output; }
     std::uint32_t baud() const { return settings_.baud; }

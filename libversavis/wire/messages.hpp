@@ -338,7 +338,7 @@ struct TimeOutput {
     std::int64_t utc_s;               ///< seconds of UTC since 1970, without leap seconds
     std::int32_t pace_ppb;            ///< how much faster board time passes than UTC
     std::int32_t delay_ns;            ///< from the second to the pulse
-    std::uint32_t pulse_ns;           ///< width
+    std::uint32_t pulse_ns;           ///< width; 0: this time output is not used
     std::uint32_t baud;               ///< of the sentences; 0: only pulses
     std::uint16_t holdover_s;         ///< without another message the board goes on for so long
     std::uint16_t sentence_delay_ms;  ///< from the pulse to the first sentence

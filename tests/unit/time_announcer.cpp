@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/time_announcer.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
@@ -88,6 +89,24 @@ TEST_CASE("time_announcer: the board learns where the next second of UTC lies") 
           5'000);
     const std::int64_t utc_ns = bench.clocks->value_ns(clock::SystemClock::realtime);
     CHECK(std::llabs(message.utc_s - utc_ns / 1'000'000'000) <= 1);
+}
+
+TEST_CASE("time_announcer: what an earlier service used ends, once for each connection") {
+    const auto unused = [](const wire::TimeOutput& message) { return message.pulse_ns == 0; };
+    TimeBench none(clock::OutputClockKind::realtime, {});
+    for (int i = 0; i < 2; ++i) {
+        const auto messages = none.announcer.messages(none.now(), none.translator);
+        REQUIRE(messages.size() == 2);
+        CHECK(std::all_of(messages.begin(), messages.end(), unused));
+        CHECK(messages[0].index + messages[1].index == 1);
+        CHECK(none.announcer.messages(none.now() + seconds(2), none.translator).empty());
+        none.announcer.begin();
+    }
+    TimeBench one;
+    const auto messages = one.announcer.messages(one.now(), one.translator);
+    REQUIRE(messages.size() == 2);
+    CHECK((unused(messages[0]) && messages[0].index == 1));
+    CHECK_FALSE(unused(messages[1]));
 }
 
 TEST_CASE("time_announcer: with TAI as output clock the second is UTC's all the same") {
@@ -179,7 +198,7 @@ TEST_CASE("time_announcer: pulses that the board reports are compared with the o
         CHECK(bench.announcer.report(bench.now())[0].state == TimeOutputState::wrong);
         CHECK(bench.known(seconds(5)));
     }
-    SECTION("one that no such output has") {
+    SECTION("one of an output that an earlier service used") {
         event.source = 1;
         CHECK_FALSE(bench.announcer.sent(event, bench.now(), bench.translator));
     }

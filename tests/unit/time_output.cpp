@@ -163,3 +163,30 @@ TEST_CASE("time_output: a configuration leaves it alone, or takes what it needs"
     CHECK(bench.port.uart.sent.empty());
     CHECK(bench.events(wire::BoardEventKind::time_pulse).size() == 2);
 }
+
+TEST_CASE("time_output: what it leaves is at rest: output and line") {
+    BoardBench bench;
+    wire::TimeOutput message = message_of(2 * second);
+    message.flags |= wire::time_pulse_inverted | wire::time_serial_inverted;
+    bench.send(message);
+    bench.run(second);
+    CHECK(bench.port.uart.inverted);
+    CHECK(changes(bench) == std::vector<std::pair<Nanoseconds, bool>>{{1 * ms, true}});
+    SECTION("it is not used any more") {
+        message = {};
+        bench.send(message);
+        bench.run(3 * second);
+    }
+    SECTION("an IMU needs the line") {
+        bench.configuration.imus[1] = {wire::ImuKind::vn100, 0, 0, 0, 200'000};
+        bench.configure();
+        bench.run(3 * second);
+    }
+    CHECK_FALSE(bench.port.uart.inverted);
+    REQUIRE(changes(bench).size() == 2);
+    CHECK_FALSE(changes(bench)[1].second);
+    bench.port.uart.sent.clear();
+    bench.run(5 * second);
+    CHECK(bench.port.uart.sent.find("RMC") == std::string::npos);
+    CHECK(bench.all<wire::Log>().empty());
+}
