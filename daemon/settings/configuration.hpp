@@ -197,14 +197,14 @@ struct TimeOutputConfiguration {
     std::string name = "lidar";
     const TimeOutputModel* model = &time_output_models().front();
     std::uint8_t output = wire::test_at_sync;  ///< as `test_output`
-    double pulse_ms = 50;
+    double pulse_ms = 30;
     bool pulse_inverted = false;
     double delay_us = 0;  ///< from the second to the pulse
     std::vector<std::string> sentences{"RMC"};
     std::string talker = "GP";
     unsigned baud = 9600;
     std::optional<bool> serial_inverted;  ///< none: as the model has it
-    double sentence_delay_ms = 60;        ///< from the pulse to the first sentence
+    double sentence_delay_ms = 90;        ///< from the pulse to the first sentence
     unsigned holdover_s = 30;
 
     bool inverts_serial() const { return serial_inverted.value_or(model->serial_inverted); }

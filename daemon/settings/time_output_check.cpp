@@ -90,19 +90,15 @@ void check_sentences(const TimeOutputConfiguration& output, Findings& findings) 
     const double begin = output.sentence_delay_ms;
     const auto count = static_cast<std::uint32_t>(output.sentences.size());
     const double end = begin + wire::limits::sentences_last_ms(count, output.baud);
-    if (begin < model.earliest_sentence_ms)
-        findings.add(output.entry, "sentence_delay_ms",
-                     fmt::format("{} reads no sentence that begins sooner than {:g} ms after the "
-                                 "pulse",
-                                 model.name, model.earliest_sentence_ms),
-                     "raise it", TomlRange{model.earliest_sentence_ms, std::nullopt});
-    if (model.after_pulse && begin < output.pulse_ms)
+    if (const double earliest = output.pulse_ms + model.pause_ms.value_or(0);
+        model.pause_ms && begin < earliest)
         findings.add(
             output.entry, "sentence_delay_ms",
-            fmt::format("{} wants the sentence to end after the pulse, which lasts {:g} ms",
-                        model.name, output.pulse_ms),
-            "let it begin after the pulse: raise it, or lower 'pulse_ms'",
-            TomlRange{output.pulse_ms, std::nullopt});
+            fmt::format("'sentence_delay_ms' is {:g} ms, but {} wants the sentence {:g} ms "
+                        "after the end of the pulse ('pulse_ms')",
+                        begin, model.name, *model.pause_ms),
+            fmt::format("raise it to {:g}, or lower 'pulse_ms'", earliest),
+            TomlRange{earliest, std::nullopt});
     findings.limit(output.entry, "sentence_delay_ms", begin, model.latest_begin_ms,
                    fmt::format("the latest begin that {} reads", model.name), "lower it");
     if (end > model.latest_end_ms)

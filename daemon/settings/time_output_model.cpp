@@ -11,12 +11,12 @@ const std::vector<TimeOutputModel>& time_output_models() {
     constexpr double longest = limits::longest_time_pulse_ns * 1e-6;
     constexpr double last = limits::last_sentence_ms;
     static const std::vector<TimeOutputModel> all{
-        {"generic", false, shortest, longest, {}, {}, 0, last, last, false},
-        {"velodyne", true, 20, 200, {"RMC", "GGA"}, {9600}, 50, 500, 500, false},
-        {"ouster", false, shortest, longest, {"RMC"}, {9600, 115200}, 0, last, last, false},
-        {"livox", false, 5, longest, {"RMC"}, {9600}, 0, 430, last, false},
-        {"hesai", true, shortest, longest, {"RMC", "GGA"}, {}, 0, last, last, true},
-        {"robosense", true, 20, 200, {"RMC"}, {9600}, 0, 500, 500, false}};
+        {"generic", false, shortest, longest, {}, {}, {}, last, last},
+        {"velodyne", true, 20, 200, {"RMC", "GGA"}, {9600}, 50, 500, last},
+        {"ouster", false, shortest, longest, {"RMC"}, {9600, 115200}, {}, last, last},
+        {"livox", false, 5, longest, {"RMC"}, {9600}, {}, 430, last},
+        {"hesai", true, shortest, longest, {"RMC", "GGA"}, {}, 0, last, last},
+        {"robosense", true, 20, 200, {"RMC"}, {9600}, {}, 500, 500}};
     return all;
 }
 

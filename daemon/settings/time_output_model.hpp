@@ -2,6 +2,7 @@
 // What LiDARs accept as pulse and sentence; docs/user/lidar.md has the sources.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,9 @@ struct TimeOutputModel {
     double longest_pulse_ms;
     std::vector<std::string> sentences;  ///< of which it reads one; empty: any
     std::vector<unsigned> bauds;         ///< empty: any
-    double earliest_sentence_ms;         ///< begin of the first, after the pulse's begin
-    double latest_begin_ms;              ///< the same
-    double latest_end_ms;                ///< end of the last
-    bool after_pulse;                    ///< they end after the pulse
+    std::optional<double> pause_ms;      ///< from the pulse's end to the first sentence, at least
+    double latest_begin_ms;              ///< of the first sentence, after the pulse's begin
+    double latest_end_ms;                ///< of the last one
 };
 
 /// "generic" first.

@@ -135,7 +135,7 @@ export class Host {
         view.setUint32(24, pulse, true);
         view.setUint32(28, baud, true);
         view.setUint16(32, 30, true); // s of holdover
-        view.setUint16(34, 60, true); // ms from pulse to sentence
+        view.setUint16(34, 90, true); // ms from pulse to sentence
         view.setUint8(38, flags);
         view.setUint8(39, sentences);
         payload.set(Buffer.from('GP'), 40);

@@ -15,10 +15,10 @@ SERIAL_INVERTED = 4
 
 # By LiDAR: seconds, first UTC second, pulse in ms, baud, sentences, whether the line rests low.
 CASES = {
-    "velodyne": (20, 1_798_761_590, 50, 9600, RMC, True),
+    "velodyne": (20, 1_798_761_590, 30, 9600, RMC, True),
     "ouster": (8, 1_835_481_594, 20, 115200, RMC | GGA | ZDA, False),
-    "livox": (8, 1_772_323_195, 50, 9600, RMC, False),
-    "hesai": (8, 1_814_399_995, 50, 4800, RMC | GGA, True),
+    "livox": (8, 1_772_323_195, 30, 9600, RMC, False),
+    "hesai": (8, 1_814_399_995, 30, 4800, RMC | GGA, True),
     "robosense": (8, 1_798_761_595, 100, 9600, RMC, True),
 }
 

@@ -18,10 +18,10 @@ RMC, GGA, ZDA = 1, 2, 4
 # ms, baud, sentences. New Year, 28 February of leap years and others, and the last day that two
 # digits of a year can name.
 CASES = {
-    "velodyne": (1_798_758_000, 1_798_761_600, 0, 50, 9600, RMC),
+    "velodyne": (1_798_758_000, 1_798_761_600, 0, 30, 9600, RMC),
     "ouster": (1_835_391_600, 0, 10_000, 20, 115200, RMC | GGA | ZDA),
-    "livox": (1_772_308_800, 0, -250_000, 50, 9600, RMC),
-    "hesai": (1_814_396_000, 1_814_400_000, 0, 50, 9600, RMC | GGA),
+    "livox": (1_772_308_800, 0, -250_000, 30, 9600, RMC),
+    "hesai": (1_814_396_000, 1_814_400_000, 0, 30, 9600, RMC | GGA),
     "robosense": (4_102_300_000, 0, 0, 100, 9600, RMC),
 }
 # Time until a LiDAR has locked after each fault, and faults last: of all seconds, so many are named

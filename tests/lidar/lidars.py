@@ -21,12 +21,14 @@ class Manual:
     begin: tuple = (0, SECOND)
     end: int = SECOND  # the sentence's, at the latest
     ends_after_pulse: bool = False
+    pause: int = None  # at least, from the pulse's fall to the sentence
     period_tolerance: int = 500_000  # of two pulses
 
 
 MANUALS = {manual.name: manual for manual in (
-    Manual("velodyne", ("GPRMC", "GPGGA"), width=(20 * MS, 200 * MS), begin=(50 * MS, 500 * MS),
-           end=500 * MS),
+    # As strict as an HDL-32E.
+    Manual("velodyne", ("GPRMC", "GPGGA"), width=(20 * MS, 200 * MS), begin=(0, 500 * MS),
+           pause=50 * MS),
     Manual("ouster", ("GPRMC",)),
     Manual("livox", ("GPRMC",), width=(5 * MS, 900 * MS), begin=(0, 430 * MS)),
     Manual("hesai", ("GPRMC", "GPGGA"), width=(MS, SECOND), end=900 * MS, ends_after_pulse=True,
@@ -109,7 +111,8 @@ class Lidar:
         since = begin - self.rise
         low, high = self.manual.begin
         in_window = low <= since <= high and end - self.rise <= self.manual.end
-        if not in_window or (self.manual.ends_after_pulse and end < self.fall):
+        paused = self.manual.pause is None or begin - self.fall >= self.manual.pause
+        if not in_window or not paused or (self.manual.ends_after_pulse and end < self.fall):
             return
         self.named.append((self.rise, kind, utc))
 

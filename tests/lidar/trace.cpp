@@ -350,7 +350,7 @@ Task task_of(const std::vector<std::string>& arguments) {
     task.settings.sentences = static_cast<std::uint8_t>(number(7));
     task.settings.flags = static_cast<std::uint8_t>(number(8));
     task.settings.holdover_s = 30;
-    task.settings.sentence_delay_ms = 60;
+    task.settings.sentence_delay_ms = 90;
     task.settings.talker[0] = 'G';
     task.settings.talker[1] = 'P';
     return task;

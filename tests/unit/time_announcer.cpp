@@ -81,7 +81,7 @@ TEST_CASE("time_announcer: the board learns where the next second of UTC lies") 
     CHECK((message.flags & wire::time_serial_inverted) != 0);
     CHECK(message.output == wire::test_at_sync);
     CHECK(message.delay_ns == -2'500);
-    CHECK(message.pulse_ns == 50'000'000);
+    CHECK(message.pulse_ns == 30'000'000);
     CHECK(message.sentences == (wire::sentence_rmc | wire::sentence_zda));
     CHECK(message.holdover_s == 30);
     CHECK(message.pace_ppb == Approx(30'000).margin(300));

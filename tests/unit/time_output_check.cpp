@@ -109,9 +109,9 @@ TEST_CASE("time_output_check: a LiDAR gets what its manual says that it accepts"
          {"model = 'livox'\nbaud = 115200\n",
           "3:8: livox does not read 115200 baud; use "
           "9600"},
-         {"model = 'velodyne'\nsentence_delay_ms = 40\n",
-          "3:21: velodyne reads no sentence that begins sooner than 50 ms after the pulse; "
-          "raise it"},
+         {"model = 'velodyne'\nsentence_delay_ms = 70\n",
+          "3:21: 'sentence_delay_ms' is 70 ms, but velodyne wants the sentence 50 ms after the end "
+          "of the pulse ('pulse_ms'); raise it to 80, or lower 'pulse_ms'"},
          {"model = 'livox'\nsentence_delay_ms = 440\n",
           "3:21: 'sentence_delay_ms' is 440 ms, but must be at most 430 ms (the latest begin "
           "that livox reads); lower it"},
@@ -119,8 +119,8 @@ TEST_CASE("time_output_check: a LiDAR gets what its manual says that it accepts"
           "3:21: the last sentence ends 536 ms after the pulse, but must end within 500 ms; "
           "lower it, send fewer sentences, or raise 'baud'"},
          {"model = 'hesai'\npulse_ms = 100\n",
-          "1:1: hesai wants the sentence to end after the pulse, which lasts 100 ms; let it "
-          "begin after the pulse: raise it, or lower 'pulse_ms'"}});
+          "1:1: 'sentence_delay_ms' is 90 ms, but hesai wants the sentence 0 ms after the end of "
+          "the pulse ('pulse_ms'); raise it to 100, or lower 'pulse_ms'"}});
     for (const TimeOutputModel& model : time_output_models()) {
         INFO(model.name);
         CHECK(time_errors("[[time_output]]\nmodel = '" + model.name + "'\n").empty());
