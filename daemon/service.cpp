@@ -201,7 +201,9 @@ void Service::announce(HostTime now) {
     const std::uint32_t capabilities = board_->report().capabilities;
     if (alignment_.wanted() && (capabilities & wire::capability_host_grid) != 0)
         if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
-    if ((capabilities & wire::capability_time_output) != 0)
+    if ((capabilities & wire::capability_time_output) == 0)
+        time_announcer_.board_lacks_them();
+    else
         for (const wire::TimeOutput& message : time_announcer_.messages(now, translator_))
             board_->announce_time(message);
 }

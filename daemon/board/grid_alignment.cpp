@@ -54,7 +54,7 @@ std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Trans
                        (second->state == clock::ClockState::locked ||
                         second->state == clock::ClockState::converging);
     if (!known) return std::nullopt;
-    const auto pace_ppb = pace_.add_ppb(*second);
+    const auto pace_ppb = pace_.add(*second);
     if (!pace_ppb) return std::nullopt;
     next_ = now + interval;
     updated_ = now;

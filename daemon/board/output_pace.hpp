@@ -14,17 +14,16 @@ namespace versavis::daemon {
 /// clock, one a second, since that may be slewed against the host's. Not thread-safe.
 class OutputPace {
  public:
-    /// In parts of 1.
-    double add(const clock::BoardSecond& second);
-
-    /// The same in parts per billion; none: more than the board takes.
-    std::optional<std::int32_t> add_ppb(const clock::BoardSecond& second);
+    /// In parts per billion; none: more than the board takes.
+    std::optional<std::int32_t> add(const clock::BoardSecond& second);
 
  private:
     struct Offset {
         HostTime host;
         Duration output_minus_host;
     };
+
+    double slewed() const;
 
     std::optional<std::uint32_t> epoch_;
     std::deque<Offset> offsets_;  ///< of the last seconds, in one epoch

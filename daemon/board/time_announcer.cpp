@@ -79,7 +79,7 @@ const char* to_string(TimeOutputState state) {
 
 TimeAnnouncer::TimeAnnouncer(const std::vector<TimeOutputConfiguration>& outputs) {
     for (std::size_t i = 0; i < outputs.size(); ++i) {
-        Output output{settings_of(outputs[i], i), {}, {}, {}};
+        Output output{settings_of(outputs[i], i), {}, {}, {}, {}};
         output.report.name = outputs[i].name;
         outputs_.push_back(std::move(output));
     }
@@ -119,10 +119,15 @@ std::string TimeAnnouncer::find_second(HostTime now, clock::Translator& translat
     if (clock.kernel.leap_s != 0) second.to_leap_s = day_s - near_leap_s - in_day;
     if (second.to_leap_s <= 0 || (clock.kernel.leap_s != 0 && in_day < near_leap_s))
         return "a leap second is near";
-    const auto pace = pace_.add_ppb(*found);
+    const auto pace = pace_.add(*found);
     if (!pace) return "board and output clock differ by more than 500 ppm";
     second.pace_ppb = *pace;
     return "";
+}
+
+void TimeAnnouncer::board_lacks_them() {
+    const std::lock_guard lock(mutex_);
+    unknown_ = "the board's firmware has no time outputs: update it with 'versavis flash'";
 }
 
 std::vector<wire::TimeOutput> TimeAnnouncer::messages(HostTime now, clock::Translator& translator) {
@@ -176,6 +181,7 @@ std::optional<Duration> TimeAnnouncer::sent(const wire::Event& event, HostTime n
         pulse_tolerance + Duration{std::int64_t{stamp->sigma_ns} * tolerated_sigmas};
     if (absolute(error) <= tolerance) return std::nullopt;
     output.wrong = now;
+    output.wrong_by = error;
     settled_ = now + settling;
     next_ = {};
     return error;
@@ -190,7 +196,7 @@ std::vector<TimeOutputReport> TimeAnnouncer::report(HostTime now) const {
         if (output.wrong.ns != 0 && now - output.wrong < settling + start_patience) {
             report.state = TimeOutputState::wrong;
             report.hint = fmt::format("a pulse was {:.1f} us off its second",
-                                      static_cast<double>(report.error->ns) * 1e-3);
+                                      static_cast<double>(output.wrong_by.ns) * 1e-3);
         } else if (!unknown_.empty()) {
             report.state = TimeOutputState::waiting;
             report.hint = unknown_;

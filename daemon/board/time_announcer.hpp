@@ -43,6 +43,9 @@ class TimeAnnouncer {
     /// A new connection.
     void begin();
 
+    /// The firmware of the board that is connected is too old.
+    void board_lacks_them();
+
     /// What to send to the board now: once a second, and at once when the time is no longer known.
     /// The first ones of a connection also end what an earlier service used.
     std::vector<wire::TimeOutput> messages(HostTime now, clock::Translator& translator);
@@ -59,6 +62,7 @@ class TimeAnnouncer {
         TimeOutputReport report;
         HostTime reported;  ///< when the newest pulse was
         HostTime wrong;     ///< when the newest wrong one was; 0: never
+        Duration wrong_by;
     };
     struct Second {
         clock::BoardSecond at;

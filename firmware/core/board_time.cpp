@@ -97,12 +97,10 @@ bool Board::is_time_output(unsigned output) const {
 
 /// Those whose output or line the new configuration needs.
 void Board::release_time_outputs(const wire::Configuration& configuration, Nanoseconds now) {
-    for (unsigned output = 0; output < output_count; ++output)
-        for (TimeOutput& each : time_outputs_)
-            if (each.uses(output) &&
-                (is_taken(configuration, output) ||
-                 (each.sends_sentences() && !has_line(configuration, each.baud()))))
-                each.release(now);
+    for (TimeOutput& each : time_outputs_)
+        if (is_taken(configuration, each.output()) ||
+            (each.sends_sentences() && !has_line(configuration, each.baud())))
+            each.release(now);
 }
 
 void Board::poll_time_outputs(Nanoseconds now) {

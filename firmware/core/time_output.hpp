@@ -24,10 +24,11 @@ class TimeOutput {
     /// The time is no longer known.
     void doubt();
 
-    /// Its output and its line belong to others from now on.
+    /// Its output and its line belong to others from now on. Of one that has none, nothing.
     void release(Nanoseconds now);
 
     bool uses(unsigned output) const { return configured_ && output_ == output; }
+    unsigned output() const { return output_; }
     std::uint32_t baud() const { return settings_.baud; }
     bool sends_sentences() const { return configured_ && settings_.baud != 0; }
 

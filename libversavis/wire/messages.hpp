@@ -347,7 +347,7 @@ struct TimeOutput {
     std::uint8_t flags;               ///< bits of TimeOutputFlag
     std::uint8_t sentences;           ///< bits of TimeSentence
     char talker[2];                   ///< as in "GP" of "$GPRMC"
-    std::uint8_t reserved[2];
+    std::uint8_t reserved[6];
 };
 
 /// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first;

@@ -10,7 +10,6 @@ const [image, ...numbers] = process.argv.slice(2);
 const [seconds, first_utc_s, pulse, baud, sentences, flags] = numbers.map(Number);
 const gpio_transmit = 0;
 const time_known = 1;
-const board_times_faster_ppb = 0; // the emulated crystal is the judge's clock
 
 const rig = new Rig(image, quick_usb);
 rig.machine.watch([gpio_transmit]);
@@ -40,7 +39,6 @@ for (let i = 0; i < seconds; ++i) {
     rig.host.time_output({
         board: board_ns((utc_s - begins) * cycles_a_second),
         utc: utc_s,
-        pace: board_times_faster_ppb,
         pulse,
         baud,
         sentences,

@@ -99,7 +99,8 @@ json proved_status() {
                      "frames_suspect": 0, "frames_received": 1002, "frames_incomplete": 0,
                      "frames_without_trigger": 2, "exposure_ns": 3000000,
                      "camera_exposure_ns": 3000000}],
-        "imus": []})");
+        "imus": [], "time_outputs": [{"name": "lidar", "state": "sending", "health": "ok",
+                                      "fault": "", "hint": ""}]})");
 }
 
 }  // namespace
@@ -440,6 +441,10 @@ TEST_CASE("doctor: service, releases and devices") {
     host.subject.status = proved_status();
     CHECK(get(check_service(host.subject), "firmware").verdict == Verdict::good);
     CHECK(find(check_service(host.subject), "release") == nullptr);
+    findings = check_service(host.subject);
+    CHECK(std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+        return finding.subject == "lidar" && finding.value == "sending";  // it has no rate
+    }));
     host.subject.release = "1.1.0";
     json& board = host.subject.status->at("board");
     board["firmware_outdated"] = true;

@@ -69,9 +69,13 @@ TEST_CASE("ros_client: a status is a list of devices, and silence is one, too") 
         "cameras": [{"name": "a", "trigger": "board", "health": "degraded", "state": "absent",
                      "fault": "gone", "hint": "plug it in", "serial": "7", "setup": [1],
                      "exposures_unmeasured": 3}],
-        "imus": [{"name": "i", "health": "ok", "hint": "hot"}]})");
+        "imus": [{"name": "i", "health": "ok", "hint": "hot"}],
+        "time_outputs": [{"name": "t", "health": "degraded", "state": "waiting",
+                          "fault": "time_unknown"}]})");
     const auto all = diagnostics("car", status, "");
-    REQUIRE(all.size() == 3);
+    REQUIRE(all.size() == 4);
+    CHECK(all[3].name == "car: t");
+    CHECK(all[3].message == "waiting, time_unknown");
     CHECK(all[0].name == "car: clock");
     CHECK(all[0].level == Level::ok);
     CHECK(all[1].level == Level::error);

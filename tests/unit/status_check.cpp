@@ -55,6 +55,15 @@ TEST_CASE("status_check: a device that delivers nothing is critical") {
     CHECK(check_status(status).state == CheckState::critical);
 }
 
+TEST_CASE("status_check: a device without a rate is a warning") {
+    json status = well();
+    status["time_outputs"] = {{{"name", "lidar"}, {"state", "waiting"}}};
+    degrade(status, "time_outputs", "the board's clock is not known yet");
+    const CheckResult result = check_status(status);
+    CHECK(result.state == CheckState::warning);
+    CHECK_THAT(result.line, Contains("WARNING - lidar: packet_loss: the board's clock"));
+}
+
 TEST_CASE("status_check: of a start, and of an unknown clock, nothing is claimed") {
     json status = well();
     status["health"] = status["clock"]["health"] = "starting";

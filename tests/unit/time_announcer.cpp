@@ -147,6 +147,13 @@ TEST_CASE("time_announcer: no second is named that may be wrong") {
     }
 }
 
+TEST_CASE("time_announcer: firmware without time outputs is named as the cause") {
+    TimeBench bench;
+    bench.announcer.board_lacks_them();
+    CHECK(bench.hint() ==
+          "the board's firmware has no time outputs: update it with 'versavis flash'");
+}
+
 TEST_CASE("time_announcer: around a leap second nothing is named, and no holdover reaches it") {
     TimeBench bench;
     bench.run(seconds(20));
@@ -195,7 +202,9 @@ TEST_CASE("time_announcer: pulses that the board reports are compared with the o
         REQUIRE(error);
         CHECK(error->ns == Approx(-1e9).margin(1e5));
         CHECK_FALSE(bench.known(milliseconds(500)));
-        CHECK(bench.announcer.report(bench.now())[0].state == TimeOutputState::wrong);
+        report = bench.announcer.report(bench.now())[0];
+        CHECK(report.state == TimeOutputState::wrong);
+        CHECK(report.hint.find("a pulse was -10000") == 0);
         CHECK(bench.known(seconds(5)));
     }
     SECTION("one of an output that an earlier service used") {

@@ -96,6 +96,14 @@ void add_device(Findings& findings, const json& device, const std::string& name,
     findings.push_back(finding);
 }
 
+/// Not every device has a rate.
+std::string state_and_rate(const json& device) {
+    const std::string state = device.value("state", "");
+    if (!device.contains("delivered_hz")) return state;
+    return fmt::format("{}, {:.1f} of {:g} Hz", state, device.value("delivered_hz", 0.0),
+                       device.value("configured_hz", 0.0));
+}
+
 Findings check_devices(const Subject& subject) {
     if (!subject.status) return {};
     const json& status = *subject.status;
@@ -105,10 +113,7 @@ Findings check_devices(const Subject& subject) {
             add_device(findings, status[part], part, status[part].value("state", ""));
     for (const char* kind : {"cameras", "imus", "time_outputs"})
         for (const json& device : status.value(kind, json::array()))
-            add_device(
-                findings, device, device.value("name", ""),
-                fmt::format("{}, {:.1f} of {:g} Hz", device.value("state", ""),
-                            device.value("delivered_hz", 0.0), device.value("configured_hz", 0.0)));
+            add_device(findings, device, device.value("name", ""), state_and_rate(device));
     return findings;
 }
 

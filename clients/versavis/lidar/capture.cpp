@@ -14,6 +14,9 @@ constexpr int longest_frame = 65536;
 constexpr int wait_ms = 100;
 constexpr int buffer_bytes = 16 << 20;
 
+/// The year 2242. What a file says beyond is no time.
+constexpr std::int64_t latest_s = std::int64_t{1} << 33U;
+
 constexpr std::uint16_t ethertype_ip = 0x0800;
 constexpr std::uint16_t ethertype_vlan = 0x8100;
 constexpr std::uint16_t ethertype_service_vlan = 0x88A8;
@@ -123,6 +126,7 @@ Expected<std::optional<Datagram>> Capture::next() {
         if (result < 0)
             return failure(name_, pcap_geterr(handle_.get()),
                            live_ ? "is the interface up?" : "the file is cut off or damaged");
+        if (header->ts.tv_sec < 0 || header->ts.tv_sec > latest_s) continue;
         auto datagram = datagram_of({data, header->caplen}, pcap_datalink(handle_.get()));
         if (!datagram) continue;
         datagram->arrived = arrival(*header);

@@ -76,17 +76,17 @@ Slope slope_of(const std::map<std::int64_t, Duration>& smallest) {
     double mean_t = 0;
     double mean_d = 0;
     const std::int64_t begin = smallest.begin()->first;
-    const std::int64_t zero = smallest.begin()->second.ns;
+    const auto zero = static_cast<double>(smallest.begin()->second.ns);
     for (const auto& [bucket, delay] : smallest) {
         mean_t += static_cast<double>(bucket - begin) * 0.1 / count;
-        mean_d += static_cast<double>(delay.ns - zero) * 1e-3 / count;
+        mean_d += (static_cast<double>(delay.ns) - zero) * 1e-3 / count;
     }
     double tt = 0;
     double td = 0;
     double dd = 0;
     for (const auto& [bucket, delay] : smallest) {
         const double t = static_cast<double>(bucket - begin) * 0.1 - mean_t;
-        const double d = static_cast<double>(delay.ns - zero) * 1e-3 - mean_d;
+        const double d = (static_cast<double>(delay.ns) - zero) * 1e-3 - mean_d;
         tt += t * t;
         td += t * d;
         dd += d * d;

@@ -38,24 +38,25 @@ CheckResult result(CheckState state, const std::string& text, const std::string&
 struct Device {
     std::string name;
     const json* keys;
-    bool has_rate;
 };
 
 /// In the order of cause.
 std::vector<Device> devices(const json& status) {
     std::vector<Device> all;
     for (const char* part : {"board", "clock"})
-        if (status.contains(part)) all.push_back({part, &status[part], false});
+        if (status.contains(part)) all.push_back({part, &status[part]});
     for (const char* kind : {"cameras", "imus", "time_outputs"})
         if (status.contains(kind))
             for (const json& device : status[kind])
-                all.push_back({device.value("name", ""), &device, true});
+                all.push_back({device.value("name", ""), &device});
     return all;
 }
 
+/// Of a device that has a rate.
 bool delivers_nothing(const Device& device) {
-    return device.has_rate && device.keys->value("health", "") == "degraded" &&
-           device.keys->value("delivered_hz", 0.0) == 0;
+    constexpr double has_none = 1;
+    return device.keys->value("health", "") == "degraded" &&
+           device.keys->value("delivered_hz", has_none) == 0;
 }
 
 std::string counted(std::size_t number, std::string_view noun) {

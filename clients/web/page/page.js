@@ -202,6 +202,9 @@ function device_rows(status) {
     for (const camera of status.cameras ?? [])
         add(camera.name, camera, `${rate(camera)}, pairing ${words(camera.pairing ?? "")}`);
     for (const imu of status.imus ?? []) add(imu.name, imu, rate(imu));
+    for (const output of status.time_outputs ?? [])
+        add(output.name, output, `${output.pulses} pulses` +
+            (output.error_ns === null ? "" : `, ${length_of(output.error_ns)} off`));
     return rows;
 }
 

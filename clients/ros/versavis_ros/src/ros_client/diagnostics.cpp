@@ -57,6 +57,8 @@ std::vector<DiagnosticStatus> diagnostics(const std::string& instance, const jso
             text(camera, "trigger") == "board" ? "middle of the exposure" : "arrival of the frame");
     for (const json& imu : status.value("imus", json::array()))
         add(text(imu, "name"), imu, "instant of the motion");
+    for (const json& output : status.value("time_outputs", json::array()))
+        add(text(output, "name"), output, "");
     return statuses;
 }
 
