@@ -218,13 +218,14 @@ void Trial::announce(Nanoseconds now) {
     if (task_.leap_utc_s != 0 && !leapt_)
         message.holdover_s = static_cast<std::uint16_t>(
             std::clamp<std::int64_t>(task_.leap_utc_s - 3 - utc_s, 1, message.holdover_s));
-    // One that is wrong is never followed by another: two that agree are what the board believes.
+    // The board believes two messages that agree. So one that is wrong is never followed by
+    // another, nor is it wrong by what the clock steps: it would confirm what was true before.
     wrong_ = random_.one_of(200) && !wrong_;
     if (wrong_) {
         if (random_.one_of(2))
-            message.utc_s += random_.one_of(2) ? 1 : -1;
+            message.utc_s += random_.between(2, 100) * (random_.one_of(2) ? 1 : -1);
         else
-            message.board_ns += random_.between(-400, 400) * ms;
+            message.board_ns += random_.between(-400'000, 400'000) * us;
     }
     post(arrives, message, "announced", fmt::format(" {} {}", utc_s * second, begins));
 }

@@ -98,7 +98,7 @@ void add_device(Findings& findings, const json& device, const std::string& name,
 
 /// Not every device has a rate.
 std::string state_and_rate(const json& device) {
-    const std::string state = device.value("state", "");
+    std::string state = device.value("state", "");
     if (!device.contains("delivered_hz")) return state;
     return fmt::format("{}, {:.1f} of {:g} Hz", state, device.value("delivered_hz", 0.0),
                        device.value("configured_hz", 0.0));
