@@ -20,7 +20,10 @@ using Qos = std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)>;
 
 /// What a writer waits for readers that are slow: no frame may wait for the one before.
 constexpr dds_duration_t longest_block = DDS_MSECS(10);
-constexpr int kept = 5;
+/// What can be sent again: half a second of images at 20 Hz and of samples at 1 kHz, since a reader
+/// asks for what it lacks up to 100 ms later. What all readers have is not kept.
+constexpr int kept_images = 10;
+constexpr int kept_messages = 500;
 
 /// SHA-256 of the type's description in JSON (REP 2016).
 constexpr std::array<std::pair<std::string_view, std::string_view>, 8> hashes{{
@@ -46,7 +49,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 8> hashes{{
 Qos writer_qos(std::string_view type) {
     Qos qos(dds_create_qos(), dds_delete_qos);
     dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, longest_block);
-    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kept);
+    const bool images = type == "sensor_msgs/msg/Image";
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, images ? kept_images : kept_messages);
     dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
     const std::string data = fmt::format("typehash={};", type_hash(type));
     dds_qset_userdata(qos.get(), data.data(), data.size());

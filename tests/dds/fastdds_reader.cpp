@@ -27,6 +27,8 @@ namespace {
 constexpr std::uint32_t largest_message = 16 * 1024 * 1024;
 /// An image of several megabytes arrives at once.
 constexpr std::uint32_t receive_buffer = 4 * 1024 * 1024;
+/// Behind a message that is sent again, others wait.
+constexpr int kept_messages = 500;
 
 using Bytes = std::vector<unsigned char>;
 
@@ -107,7 +109,7 @@ int main(int argc, char** argv) {
         fast::DataReaderQos reader_qos;
         reader_qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
         reader_qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
-        reader_qos.history().depth = 10;
+        reader_qos.history().depth = kept_messages;
         reader_qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
         printers.push_back(std::make_unique<Printer>(topic));
         if (subscriber->create_datareader(description, reader_qos, printers.back().get()) ==
