@@ -40,6 +40,7 @@ ring::Shape ring_of(const ImuConfiguration& imu) {
 /// Of all rings: readers of these are handed over.
 std::vector<std::string> ring_names(const Configuration& configuration) {
     std::vector<std::string> names{"status", "events", "clock"};
+    if (configuration.ports.nmea) names.emplace_back(nmea_stream);
     for (const ImuConfiguration& imu : configuration.imus) names.push_back(imu.name);
     for (const CameraConfiguration& camera : configuration.cameras) {
         names.push_back(camera.name);
@@ -105,6 +106,11 @@ Expected<> Service::make_rings() {
         imus_.push_back(
             std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_, *events_));
     }
+    if (!configuration_.ports.nmea) return {};
+    auto ring = NmeaPipeline::make_ring(place);
+    if (!ring) return Unexpected(ring.error());
+    nmea_ = std::make_unique<NmeaPipeline>(configuration_.ports.nmea_baud, std::move(*ring),
+                                           translator_);
     return {};
 }
 
@@ -176,6 +182,7 @@ Service::~Service() {
 /// Before the clock is: no record of the old life may be translated by the new clock.
 void Service::board_restarted() {
     for (auto& imu : imus_) imu->board_restarted();
+    if (nmea_) nmea_->board_restarted();
     cameras_->board_restarted();
 }
 
@@ -219,6 +226,10 @@ bool Service::imu_sample(const wire::ImuSample& sample, HostTime received) {
     for (auto& imu : imus_)
         if (imu->port() == sample.imu) return imu->add(sample, received);
     return false;
+}
+
+void Service::sentence(const wire::Sentence& sentence, HostTime received) {
+    if (nmea_) nmea_->add(sentence, received);
 }
 
 void Service::exchange_doubted(const Implausibility& doubt) {
@@ -289,6 +300,7 @@ void Service::tick() {
     cameras_->tick(now);
     if (board_->running()) announce(now);
     for (auto& imu : imus_) imu->heartbeat(now);
+    if (nmea_) nmea_->heartbeat(now);
     events_->heartbeat(now);
     clock_recorder_->tick(now);
     directory_.epochs().keep(translator_.output_now().epoch);
@@ -341,6 +353,10 @@ Status Service::collect_status(HostTime now) {
         status.imus.push_back({imu->report()});
         const ImuReport& report = status.imus.back().report;
         status.streams.push_back({report.name, "imu", report.published});
+    }
+    if (nmea_) {
+        status.nmea = nmea_->report();
+        status.streams.push_back({nmea_stream, "nmea", status.nmea->sentences});
     }
     status.streams.push_back({"events", "events", events_->items()});
     status.streams.push_back({"clock", "clock", clock_recorder_->items()});

@@ -18,6 +18,7 @@
 #include "health/clock_step_detector.hpp"
 #include "health/status_publisher.hpp"
 #include "pipeline/imu_pipeline.hpp"
+#include "pipeline/nmea_pipeline.hpp"
 #include "plausibility/event_validator.hpp"
 #include "publish/clock_recorder.hpp"
 #include "publish/event_journal.hpp"
@@ -82,6 +83,7 @@ class Service final : public Controlled, private BoardListener {
     bool imu_sample(const wire::ImuSample& sample, HostTime received) override;
     void exchange_doubted(const Implausibility& doubt) override;
     void board_event(const wire::Event& event, HostTime received) override;
+    void sentence(const wire::Sentence& sentence, HostTime received) override;
 
     Configuration configuration_;
     ring::OwnedDirectory directory_;
@@ -97,6 +99,7 @@ class Service final : public Controlled, private BoardListener {
     EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
+    std::unique_ptr<NmeaPipeline> nmea_;  ///< null: no receiver is configured
     std::unique_ptr<BoardLink> board_;
     std::unique_ptr<CameraGroup> cameras_;
     std::atomic<bool> unkept_{false};  ///< the board could not store its configuration

@@ -49,17 +49,23 @@ constexpr Duration shortest_time_pulse = milliseconds(1);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
 
-/// As a receiver in Zurich reports it.
-std::string rmc(std::int64_t utc_s) {
-    const std::time_t seconds = utc_s;
-    std::tm utc{};
-    gmtime_r(&seconds, &utc);
-    const std::string body = fmt::format(
-        "GPRMC,{:02}{:02}{:02}.00,A,4722.6,N,00832.9,E,0.0,0.0,{:02}{:02}{:02},,,A", utc.tm_hour,
-        utc.tm_min, utc.tm_sec, utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
+std::string sentence(const std::string& body) {
     unsigned sum = 0;
     for (const char c : body) sum ^= static_cast<unsigned char>(c);
     return fmt::format("${}*{:02X}\r\n", body, sum);
+}
+
+/// RMC and GGA as a receiver in Zurich sends them.
+std::string sentences(std::int64_t utc_s) {
+    const std::time_t seconds = utc_s;
+    std::tm utc{};
+    gmtime_r(&seconds, &utc);
+    const std::string time = fmt::format("{:02}{:02}{:02}.00", utc.tm_hour, utc.tm_min, utc.tm_sec);
+    const std::string date =
+        fmt::format("{:02}{:02}{:02}", utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
+    const std::string_view place = "4722.6,N,00832.9,E";
+    return sentence(fmt::format("GPRMC,{},A,{},0.0,0.0,{},,,A", time, place, date)) +
+           sentence(fmt::format("GPGGA,{},{},1,08,1.0,420.0,M,47.0,M,,", time, place));
 }
 
 }  // namespace
@@ -257,7 +263,7 @@ void BoardHost::live() {
     }
 }
 
-/// The pulse at each second, and its sentence.
+/// The pulse at each second, and its sentences.
 void BoardHost::hear_gnss() {
     constexpr std::int64_t second_ns = 1'000'000'000;
     const Duration offset = utc_->offset();
@@ -268,7 +274,7 @@ void BoardHost::hear_gnss() {
     const auto input = static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_pps});
     board_->schedule_edge({clock_->device_ns(pulse), input, true});
     board_->schedule_edge({clock_->device_ns(pulse + milliseconds(100)), input, false});
-    const std::string text = rmc(next_utc_s_++);
+    const std::string text = sentences(next_utc_s_++);
     const HostTime complete =
         pulse + sentence_after + byte_at_9600_baud * static_cast<std::int64_t>(text.size());
     board_->uart_receive({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},

@@ -20,6 +20,7 @@
 #include "commands/doctor_command.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
+#include "commands/gnss_command.hpp"
 #include "commands/lidar_command.hpp"
 #include "commands/list.hpp"
 #include "commands/monitor_commands.hpp"
@@ -183,6 +184,8 @@ int main(int argc, char** argv) {
 
     client::CameraCommands camera(app);
 
+    client::GnssCommand gnss(app);
+
     client::LidarCommand lidar(app, [] { return stop_requested != 0; });
 
     client::ControlCommands control(app);
@@ -239,6 +242,7 @@ int main(int argc, char** argv) {
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
+    if (gnss.chosen()) return gnss.run();
     if (lidar.chosen()) return lidar.run();
     if (control.chosen()) return control.run(instance);
     if (discover.chosen()) return discover.run(instance);

@@ -338,6 +338,8 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
                              }) ||
         use<wire::Event>(packet,
                          [&](const auto& event) { listener_.board_event(event, received); }) ||
+        use<wire::Sentence>(packet,
+                            [&](const auto& line) { listener_.sentence(line, received); }) ||
         use<wire::ClockAnswer>(packet,
                                [&](const auto& answer) { note(clock_.take(answer, received)); }) ||
         use<wire::ClockFollowUp>(packet,

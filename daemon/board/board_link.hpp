@@ -42,6 +42,7 @@ class BoardListener {
     virtual bool imu_sample(const wire::ImuSample& sample, HostTime received) = 0;
     virtual void exchange_doubted(const Implausibility& doubt) = 0;
     virtual void board_event(const wire::Event& event, HostTime received) = 0;
+    virtual void sentence(const wire::Sentence& /*sentence*/, HostTime /*received*/) {}
 };
 
 enum class BoardState { absent, handshake, running, incompatible, refused };

@@ -282,6 +282,13 @@ std::string to_json(const Status& status) {
                             {"error_ns", report.error ? json(report.error->ns) : json(nullptr)}},
                            output.diagnosis));
     }
+    json nmea;
+    if (status.nmea)
+        nmea = {{"stream", nmea_stream},
+                {"sentences", status.nmea->sentences},
+                {"damaged", status.nmea->damaged},
+                {"suspect", status.nmea->suspect},
+                {"lost", status.nmea->lost}};
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
         streams.push_back({{"name", stream.name},
@@ -304,6 +311,7 @@ std::string to_json(const Status& status) {
         {"cameras", cameras},
         {"imus", imus},
         {"time_outputs", time_outputs},
+        {"nmea", nmea},
         {"streams", streams}};
     // Names from devices may hold anything; what is no UTF-8 is replaced.
     return document.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -14,6 +14,7 @@
 #include "engine/clock/translator.hpp"
 #include "pipeline/camera_pipeline.hpp"
 #include "pipeline/imu_pipeline.hpp"
+#include "pipeline/nmea_pipeline.hpp"
 
 namespace versavis::daemon {
 
@@ -65,6 +66,7 @@ struct Status {
     std::vector<CameraStatus> cameras;
     std::vector<ImuStatus> imus;
     std::vector<TimeOutputStatus> time_outputs;
+    std::optional<NmeaReport> nmea;
     std::vector<StreamStatus> streams;
 };
 

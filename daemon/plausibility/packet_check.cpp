@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "packet_check.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <string_view>
 
 namespace versavis::daemon {
 
@@ -61,6 +63,14 @@ bool possible(const wire::Event& message) {
         case wire::BoardEventKind::stored: return message.value == 0 || message.value == 1;
         default: return true;
     }
+}
+
+bool possible(const wire::Sentence& message) {
+    if (!in_life(message.time_ns) || message.size == 0 || message.size > sizeof message.text)
+        return false;
+    const std::string_view text(message.text, message.size);
+    const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
+    return (text[0] == '$' || text[0] == '!') && std::all_of(text.begin(), text.end(), printable);
 }
 
 bool possible(const wire::Health& message) {

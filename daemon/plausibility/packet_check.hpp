@@ -35,6 +35,7 @@ bool possible(const wire::BoardHello& message);
 bool possible(const wire::Exposure& message);
 bool possible(const wire::ImuSample& message);
 bool possible(const wire::Event& message);
+bool possible(const wire::Sentence& message);
 bool possible(const wire::Health& message);
 bool possible(const wire::ClockAnswer& message);
 bool possible(const wire::ClockFollowUp& message);

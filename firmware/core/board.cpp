@@ -38,7 +38,7 @@ constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
     wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
-    wire::capability_nmea | wire::capability_time_output;
+    wire::capability_nmea | wire::capability_time_output | wire::capability_sentences;
 
 /// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. If lower,
 /// contacts that bounce count double.
@@ -141,6 +141,14 @@ Nanoseconds Board::find_next_wake() const {
 template <class T>
 void Board::send(const T& message) {
     if (greeted_) transmitter_.send(message);  // silent until the host has said hello
+}
+
+void Board::take_sentence() {
+    wire::Sentence line{};
+    nmea_.copy_to(line);
+    send(line);
+    UtcLabel label;
+    if (nmea_.label(label)) event(wire::BoardEventKind::utc_label, 0, label.pulse, label.utc_s, 0);
 }
 
 void Board::poll_link() {

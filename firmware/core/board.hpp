@@ -59,6 +59,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void poll_configuration(Nanoseconds now);
     void poll_imus(Nanoseconds now);
     void poll_nmea();
+    void take_sentence();
     void poll_health(Nanoseconds now);
     void take_edge(const Edge& edge, Nanoseconds now);
     void take_exposure_edge(const Edge& edge);

@@ -191,13 +191,11 @@ void Board::poll_nmea() {
     if ((configuration_.ports.options & wire::port_nmea) == 0) return;
     std::uint8_t bytes[32];
     Nanoseconds received = 0;
-    UtcLabel label;
     while (const std::size_t size = hal_.imu_uart.read(bytes, sizeof bytes, received))
         for (std::size_t i = 0; i < size; ++i) {
             const Nanoseconds at =
                 received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
-            if (nmea_.take(bytes[i], at, label))
-                event(wire::BoardEventKind::utc_label, 0, label.pulse, label.utc_s, 0);
+            if (nmea_.take(bytes[i], at)) take_sentence();
         }
 }
 

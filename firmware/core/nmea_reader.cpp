@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "nmea_reader.hpp"
 
+#include <cstring>
+
 namespace versavis::firmware {
 
 namespace {
@@ -137,26 +139,41 @@ bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s) {
 }
 
 void NmeaReader::begin(std::uint32_t baud) {
+    const std::uint32_t lines = lines_;
     *this = {};
+    lines_ = lines;
     byte_duration_ = 10'000'000'000 / static_cast<Nanoseconds>(baud);
 }
 
-bool NmeaReader::take(std::uint8_t byte, Nanoseconds at, UtcLabel& label) {
-    if (byte == '$') {
+bool NmeaReader::take(std::uint8_t byte, Nanoseconds at) {
+    if (complete_) size_ = 0;
+    complete_ = false;
+    if (byte == '$' || byte == '!') {
         began_ = at - byte_duration_;
         size_ = 0;
+    } else if (size_ == 0) {
+        return false;
+    } else if (byte == '\r' || byte == '\n') {
+        ++lines_;
+        return complete_ = true;
+    } else if (byte < ' ' || byte > '~' || size_ == sizeof line_) {
+        size_ = 0;
+        return false;
     }
-    if (byte == '\r' || byte == '\n') return finish(label);
-    if (size_ == longest) size_ = 0;  // no sentence is that long
     line_[size_++] = static_cast<char>(byte);
     return false;
 }
 
-bool NmeaReader::finish(UtcLabel& label) {
-    const std::size_t size = size_;
-    size_ = 0;
+void NmeaReader::copy_to(wire::Sentence& line) const {
+    line.time_ns = began_;
+    line.sequence = lines_;
+    line.size = static_cast<std::uint8_t>(size_);
+    std::memcpy(line.text, line_, size_);
+}
+
+bool NmeaReader::label(UtcLabel& label) {
     std::int64_t utc_s;
-    if (!nmea_utc(line_, size, utc_s)) return false;
+    if (!nmea_utc(line_, size_, utc_s)) return false;
     const Nanoseconds pulse = newest_ <= began_ ? newest_ : before_;
     if (pulse > began_ || began_ - pulse >= oldest_pulse) return false;
     if (pulse == reported_.pulse && utc_s == reported_.utc_s) return false;

@@ -21,7 +21,7 @@ struct MessageQueue {
 
 constexpr auto make_message_queues() {
     // What matters most leaves first.
-    std::array<MessageQueue, 10> queues{{{wire::Type::board_hello, 1, 0, 0},
+    std::array<MessageQueue, 11> queues{{{wire::Type::board_hello, 1, 0, 0},
                                          {wire::Type::clock_follow_up, 1, 0, 0},
                                          {wire::Type::clock_answer, 8, 0, 0},
                                          {wire::Type::refusal, 48, 0, 0},
@@ -30,6 +30,7 @@ constexpr auto make_message_queues() {
                                          {wire::Type::event, 128, 0, 0},
                                          {wire::Type::health, 1, 0, 0},
                                          {wire::Type::imu_sample, 256, 0, 0},
+                                         {wire::Type::sentence, 32, 0, 0},
                                          {wire::Type::log, 8, 0, 0}}};
     std::uint32_t offset = 0;
     for (MessageQueue& queue : queues) {
@@ -48,8 +49,8 @@ constexpr unsigned queue_of(wire::Type type) {
     return queue;
 }
 
-/// Sends what matters most first: answers, exposures, events, health, samples, text. Packets are
-/// numbered as they leave, so that a gap is a loss on the line.
+/// Sends what matters most first: answers, exposures, events, health, samples, sentences, text.
+/// Packets are numbered as they leave, so that a gap is a loss on the line.
 class Transmitter {
  public:
     Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce);

@@ -45,10 +45,12 @@ struct HeldSet {
 static_assert(sizeof(versavis_frame) == ring::metadata_size);
 static_assert(sizeof(versavis_imu) == ring::metadata_size);
 static_assert(sizeof(versavis_event) == ring::metadata_size);
+static_assert(sizeof(versavis_nmea) == ring::metadata_size);
 static_assert(offsetof(versavis_frame, tick_high) == offsetof(FrameMetadata, tick_high));
 static_assert(offsetof(versavis_frame, sigma) == offsetof(FrameMetadata, sigma_ns));
 static_assert(offsetof(versavis_imu, accel_age) == offsetof(ImuMetadata, accel_age_ns));
 static_assert(offsetof(versavis_event, count) == offsetof(EventMetadata, count));
+static_assert(offsetof(versavis_nmea, reserved) == offsetof(NmeaMetadata, reserved));
 static_assert(sizeof(ring::Payload) <= sizeof(versavis_item::held) &&
               alignof(ring::Payload) <= alignof(std::uint64_t));
 static_assert(static_cast<int>(Pause::gone) == VERSAVIS_GONE);

@@ -93,6 +93,21 @@ constexpr Field event_fields[] = {
     {"flags", offsetof(EventMetadata, flags), Type::u32},
 };
 
+constexpr Field nmea_fields[] = {
+    {"epoch", offsetof(NmeaMetadata, epoch), Type::u32},
+    {"sigma_ns", offsetof(NmeaMetadata, sigma_ns), Type::u32, If::ones},
+    {"suspect", offsetof(NmeaMetadata, flags), Type::flag, If::never, 0, 1, flag_suspect},
+    {"holdover", offsetof(NmeaMetadata, flags), Type::flag, If::never, 0, 1, flag_holdover},
+    {"clamped", offsetof(NmeaMetadata, flags), Type::flag, If::never, 0, 1, flag_clamped},
+    {"sensor_error", offsetof(NmeaMetadata, flags), Type::flag, If::never, 0, 1, flag_sensor_error},
+    {"second_doubted", offsetof(NmeaMetadata, flags), Type::flag, If::never, 7, 1,
+     flag_second_doubted},
+    {"flags", offsetof(NmeaMetadata, flags), Type::u32},
+    {"sentence", offsetof(NmeaMetadata, number), Type::u64},
+    {"board_time_ns", offsetof(NmeaMetadata, board_time), Type::i64},
+    {"host_time_ns", offsetof(NmeaMetadata, host_time), Type::i64},
+};
+
 constexpr std::size_t size_of(const Field& field) {
     switch (field.type) {
         case Type::u64:
@@ -118,6 +133,7 @@ constexpr bool complete(const Field (&fields)[N], std::size_t end) {
 static_assert(complete(frame_fields, ring::metadata_size + 2 * sizeof(float)));
 static_assert(complete(imu_fields, offsetof(ImuMetadata, reserved)));
 static_assert(complete(event_fields, offsetof(EventMetadata, reserved)));
+static_assert(complete(nmea_fields, offsetof(NmeaMetadata, reserved)));
 
 template <std::size_t N>
 Fields list(const Field (&fields)[N]) {
@@ -173,6 +189,7 @@ Fields fields_of(ring::StreamKind kind) {
         case ring::StreamKind::frames: return list(frame_fields);
         case ring::StreamKind::imu: return list(imu_fields);
         case ring::StreamKind::events: return list(event_fields);
+        case ring::StreamKind::nmea: return list(nmea_fields);
         default: return {};
     }
 }

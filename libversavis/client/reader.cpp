@@ -77,12 +77,14 @@ std::uint32_t epoch_of(StreamKind kind, const Metadata& metadata) {
         case StreamKind::frames: return unpack<FrameMetadata>(metadata).epoch;
         case StreamKind::imu: return unpack<ImuMetadata>(metadata).epoch;
         case StreamKind::events: return unpack<EventMetadata>(metadata).epoch;
+        case StreamKind::nmea: return unpack<NmeaMetadata>(metadata).epoch;
         default: return no_epoch;
     }
 }
 
 bool has_epochs(StreamKind kind) {
-    return kind == StreamKind::frames || kind == StreamKind::imu || kind == StreamKind::events;
+    return kind == StreamKind::frames || kind == StreamKind::imu || kind == StreamKind::events ||
+           kind == StreamKind::nmea;
 }
 
 Unexpected<NoItem> pause(Pause why, std::uint64_t lost = 0) {

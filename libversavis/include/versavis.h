@@ -57,7 +57,8 @@ typedef enum versavis_kind {
     VERSAVIS_EVENTS = 3,
     VERSAVIS_STATUS = 4,
     VERSAVIS_EVIDENCE = 5,
-    VERSAVIS_CLOCK = 6
+    VERSAVIS_CLOCK = 6,
+    VERSAVIS_NMEA = 7
 } versavis_kind;
 
 /* A place in a stream: where reading begins, or goes on after items were lost. */
@@ -174,6 +175,17 @@ typedef struct versavis_event {
     uint32_t reserved;
 } versavis_event;
 
+/* A line of a GNSS receiver; its text is the payload, which no zero ends. */
+typedef struct versavis_nmea {
+    int64_t board_time;
+    int64_t host_time;
+    uint64_t number;
+    uint32_t sigma;
+    uint32_t epoch;
+    uint32_t flags; /* VERSAVIS_SENSOR_ERROR: its checksum is wrong, or there is none */
+    uint32_t reserved[15];
+} versavis_nmea;
+
 /* An item in place. Begin with VERSAVIS_ITEM_INIT; end with versavis_release. Until then its memory
  * stays mapped, whatever becomes of stream and service. Do not copy it. */
 typedef struct versavis_item {
@@ -188,6 +200,7 @@ typedef struct versavis_item {
         versavis_frame frame;
         versavis_imu imu;
         versavis_event event;
+        versavis_nmea nmea;
         uint64_t words[12];
     } data;
     const void *payload; /* what is read of it is good if versavis_valid says so afterwards */

@@ -49,6 +49,7 @@ enum Capability : std::uint32_t {
     capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
     capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART label the pulses of the PPS input
     capability_time_output = 1U << 10U,  ///< it sends pulses and NMEA sentences itself
+    capability_sentences = 1U << 11U,    ///< it hands on what a GNSS receiver at the UART sends
 };
 
 /// What a board has pins and peripherals for.
@@ -193,6 +194,19 @@ struct Event {
     std::uint32_t sequence;  ///< events since boot
     std::int64_t time_ns;
     std::int64_t value;
+};
+
+/// The end of the line aside; by the standard 80, which not every receiver keeps.
+inline constexpr std::size_t max_sentence_text = 104;
+
+/// One line of the GNSS receiver at the UART, right or damaged.
+struct Sentence {
+    static constexpr Type type = Type::sentence;
+    std::int64_t time_ns;    ///< its first bit arrived
+    std::uint32_t sequence;  ///< lines since boot, this one included
+    std::uint8_t size;
+    std::uint8_t reserved[3];
+    char text[max_sentence_text];  ///< printable ASCII from '$' or '!' on, zero-padded
 };
 
 struct ClockRequest {
@@ -367,6 +381,7 @@ constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera
 
 static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 56);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
+static_assert(sizeof(Sentence) == 120);
 static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 &&
               sizeof(ClockFollowUp) == 16 && sizeof(Health) == 96 && sizeof(Log) == 96);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
@@ -385,6 +400,7 @@ inline constexpr PayloadSize payload_sizes[] = {
     {ClockFollowUp::type, sizeof(ClockFollowUp)},
     {Health::type, sizeof(Health)},
     {Log::type, sizeof(Log)},
+    {Sentence::type, sizeof(Sentence)},
     {ConfigurationAnswer::type, sizeof(ConfigurationAnswer)},
     {Refusal::type, sizeof(Refusal)},
     {HostHello::type, sizeof(HostHello)},

@@ -12,7 +12,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 namespace versavis::wire {
 
 inline constexpr std::uint8_t protocol_major = 3;
-inline constexpr std::uint8_t protocol_minor = 1;
+inline constexpr std::uint8_t protocol_minor = 2;
 inline constexpr std::size_t camera_count = 4;
 
 /// `no_time` in a time field: the instant was not observed.
@@ -29,6 +29,7 @@ enum class Type : std::uint8_t {
     configuration_answer = 0x08,
     refusal = 0x09,
     clock_follow_up = 0x0A,
+    sentence = 0x0B,
     host_hello = 0x81,
     configuration = 0x82,
     start = 0x83,

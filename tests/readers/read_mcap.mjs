@@ -40,8 +40,9 @@ const checks = {
     "sensor_msgs/msg/MagneticField": ({ magnetic_field: { x } }) => Number.isFinite(x),
     "sensor_msgs/msg/Temperature": ({ temperature }) => Number.isFinite(temperature),
     "sensor_msgs/msg/TimeReference": ({ source }) => source.length > 0,
+    "nmea_msgs/msg/Sentence": ({ sentence }) => /^[$!][ -~]*$/.test(sentence),
     "std_msgs/msg/String": ({ data }) => typeof JSON.parse(data) === "object",
-    "versavis_msgs/msg/Item": ({ kind, metadata, payload, length }) => kind >= 1 && kind <= 6
+    "versavis_msgs/msg/Item": ({ kind, metadata, payload, length }) => kind >= 1 && kind <= 7
         && metadata.length === 12 && payload.length === (kind === 1 ? 8 : length),
     "versavis_msgs/msg/Stamp": ({ width, height, stride, format }) => width > 0 && height > 0
         && stride >= width && format.length > 0,

@@ -289,7 +289,8 @@ TEST_CASE("item_fields: the contract has the same names, places, types and unkno
     const std::pair<ring::StreamKind, const char*> kinds[] = {
         {ring::StreamKind::frames, "Metadata of a frame"},
         {ring::StreamKind::imu, "Metadata of an IMU sample"},
-        {ring::StreamKind::events, "Metadata of an event"}};
+        {ring::StreamKind::events, "Metadata of an event"},
+        {ring::StreamKind::nmea, "Metadata of a sentence"}};
     for (const auto& [kind, heading] : kinds) {
         const std::string text = section(contract, heading);
         const Rows documented = fields_in(text);
@@ -311,8 +312,8 @@ TEST_CASE("item_fields: the contract has the same names, places, types and unkno
 
 TEST_CASE("item_fields: the contract has the same flags, and each flag has its field") {
     std::map<unsigned, std::string> expected;
-    for (const auto kind :
-         {ring::StreamKind::frames, ring::StreamKind::imu, ring::StreamKind::events})
+    for (const auto kind : {ring::StreamKind::frames, ring::StreamKind::imu,
+                            ring::StreamKind::events, ring::StreamKind::nmea})
         for (const Field& field : fields_of(kind))
             if (field.type == FieldType::flag || field.unknown == UnknownIf::without_flag)
                 expected[bit_of(field.flags)] =

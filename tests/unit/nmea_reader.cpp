@@ -51,7 +51,8 @@ std::vector<UtcLabel> feed(NmeaReader& reader, const std::string& text, Nanoseco
     UtcLabel label;
     for (const char c : text) {
         begin += reader.byte_duration();
-        if (reader.take(static_cast<std::uint8_t>(c), begin, label)) labels.push_back(label);
+        if (reader.take(static_cast<std::uint8_t>(c), begin) && reader.label(label))
+            labels.push_back(label);
     }
     return labels;
 }
@@ -220,8 +221,7 @@ TEST_CASE("nmea_reader: any bytes at all do no harm, and a sentence after them i
         NmeaReader reader;
         reader.begin(9600);
         reader.pulse(0);
-        UtcLabel label;
-        for (const std::uint8_t byte : junk) reader.take(byte, 50 * ms, label);
+        for (const std::uint8_t byte : junk) reader.take(byte, 50 * ms);
         const auto labels = feed(reader, "\r\n" + rmc("120000", "010120") + "\r\n", 100 * ms);
         RC_ASSERT(labels.size() == 1U);
     }));
@@ -257,15 +257,15 @@ TEST_CASE("nmea_reader: a line may end in either way, and begins with its sign")
     CHECK(feed(reader, rmc("120001", "010120").substr(1) + "\r\n", 200 * ms).empty());
 }
 
-TEST_CASE("nmea_reader: a sentence has at most 100 characters") {
+TEST_CASE("nmea_reader: a sentence has at most 104 characters") {
     const std::string start = "GPZDA,120000,01,01,2020";
-    for (const std::size_t size : {99U, 100U, 101U, 102U, 200U}) {
+    for (const std::size_t size : {103U, 104U, 105U, 106U, 200U}) {
         const std::string line = sentence(start + std::string(size - start.size() - 4, ','));
         REQUIRE(line.size() == size);
         NmeaReader reader;
         reader.begin(115'200);
         reader.pulse(0);
-        CHECK(feed(reader, line + "\r\n", 100 * ms).size() == (size <= 100 ? 1 : 0));
+        CHECK(feed(reader, line + "\r\n", 100 * ms).size() == (size <= 104 ? 1 : 0));
         CHECK(feed(reader, line + std::string(size, 'x') + "\r\n", 150 * ms).empty());
         CHECK(feed(reader, line.substr(1) + "\r\n", 160 * ms).empty());
         // The next one is read again.
@@ -278,7 +278,7 @@ TEST_CASE("nmea_reader: the end of a long line is no sentence") {
     reader.begin(115'200);
     reader.pulse(0);
     const std::string line = rmc("120000", "010120") + "\r\n";
-    for (std::size_t size = 98; size < 104; ++size)
+    for (std::size_t size = 102; size < 108; ++size)
         CHECK(feed(reader, "$" + std::string(size, 'A') + line.substr(1), 100 * ms).empty());
     CHECK(feed(reader, line, 200 * ms).size() == 1);
 }
@@ -360,4 +360,45 @@ TEST_CASE(
     labels = feed(reader, line, 40 * second + 880 * ms);
     REQUIRE(labels.size() == 1);
     CHECK(labels[0].pulse == 40 * second);
+}
+
+namespace {
+
+struct TimedLine {
+    Nanoseconds at;
+    std::uint32_t sequence;
+    std::string text;
+};
+
+/// Of the bytes, sent from 1 s on.
+std::vector<TimedLine> lines(NmeaReader& reader, const std::string& bytes) {
+    std::vector<TimedLine> found;
+    Nanoseconds at = second;
+    for (const char c : bytes) {
+        at += reader.byte_duration();
+        if (!reader.take(static_cast<std::uint8_t>(c), at)) continue;
+        versavis::wire::Sentence line{};
+        reader.copy_to(line);
+        found.push_back({line.time_ns, line.sequence, std::string(line.text, line.size)});
+    }
+    return found;
+}
+
+}  // namespace
+
+TEST_CASE("nmea_reader: each line, damaged ones too, with the time of its first bit") {
+    NmeaReader reader;
+    reader.begin(9'600);
+    const std::string ubx("\xb5\x62\x01\x07$\x00!abc\x0d", 11);  // a binary message
+    const auto found =
+        lines(reader, "tail\r\n$GPGGA,1*00\r\n" + ubx + "!AIVDM,1\n\r\n$A$PUBX,00\r\n");
+    REQUIRE(found.size() == 4);
+    CHECK(found[0].text == "$GPGGA,1*00");
+    CHECK(found[0].at == second + 6 * reader.byte_duration());
+    CHECK(found[1].text == "!abc");  // nobody can tell
+    CHECK(found[2].text == "!AIVDM,1");
+    CHECK(found[3].text == "$PUBX,00");
+    for (std::uint32_t i = 0; i < found.size(); ++i) CHECK(found[i].sequence == i + 1);
+    reader.begin(115'200);
+    CHECK(lines(reader, "$X\n").at(0).sequence == 5);
 }

@@ -79,6 +79,16 @@ TimeOutput example_time_output() {
     return message;
 }
 
+Sentence example_sentence() {
+    Sentence message{};
+    message.time_ns = 7'100'000'000;
+    message.sequence = 3;
+    const std::string text = "$GPTXT,*2A";
+    message.size = static_cast<std::uint8_t>(text.size());
+    text.copy(message.text, sizeof message.text);
+    return message;
+}
+
 /// The line "name: bytes" of the test vectors in the protocol document.
 std::string documented(const std::string& name) {
     std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/contracts/wire-protocol.md");
@@ -90,7 +100,7 @@ std::string documented(const std::string& name) {
 }  // namespace
 
 TEST_CASE("packet: the test vectors of the document") {
-    CHECK(hex(encoded(HostHello{3, 1, {}}, 0x11223344, 0)) == documented("host-hello"));
+    CHECK(hex(encoded(HostHello{3, 2, {}}, 0x11223344, 0)) == documented("host-hello"));
     CHECK(hex(encoded(example_exposure(), 0xA1B2C3D4, 5)) == documented("exposure"));
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
@@ -101,6 +111,7 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(AlignGrid{7'000'000'250, -25'000, 20'000}, 0x11223344, 5)) ==
           documented("align-grid"));
     CHECK(hex(encoded(example_time_output(), 0x11223344, 6)) == documented("time-output"));
+    CHECK(hex(encoded(example_sentence(), 0xA1B2C3D4, 9)) == documented("sentence"));
     CHECK(hex(encoded(Event{BoardEventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
           documented("event"));
     CHECK(hex(encoded(example_configuration(), 0x11223344, 1)) == documented("configuration"));

@@ -152,3 +152,21 @@ TEST_CASE("packet_check: states of a report are those that there are") {
     health.reset_cause = static_cast<wire::ResetCause>(6);
     CHECK_FALSE(possible(health));
 }
+
+TEST_CASE(
+    "packet_check: a line is printable, begins with its sign, and has the size that it says") {
+    const auto sentence = [](const std::string& text) {
+        wire::Sentence message{};
+        message.size = static_cast<std::uint8_t>(text.size());
+        text.copy(message.text, sizeof message.text);
+        return message;
+    };
+    for (const char* good : {"$", "!", "$GPRMC,*00", "!AIVDM,~ "}) CHECK(possible(sentence(good)));
+    for (const char* bad : {"", "GPRMC", " $", "$\r", "$\x7f", "$\x80", "$\x1f", "#"})
+        CHECK_FALSE(possible(sentence(bad)));
+    CHECK(possible(sentence("$" + std::string(wire::max_sentence_text - 1, 'A'))));
+    CHECK_FALSE(possible(sentence("$" + std::string(wire::max_sentence_text, 'A'))));
+    wire::Sentence late = sentence("$");
+    late.time_ns = -1;
+    CHECK_FALSE(possible(late));
+}

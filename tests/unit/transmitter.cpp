@@ -92,6 +92,7 @@ TEST_CASE(
     bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
     bench.transmitter.send(wire::ImuSample{});
     bench.transmitter.send(sent_exposure(1));
+    bench.transmitter.send(wire::Sentence{});
     bench.transmitter.send(wire::ClockAnswer{1, 0, 0, 0});
     do {
         bench.link.space = 7;
@@ -99,10 +100,10 @@ TEST_CASE(
         CHECK_FALSE(bench.transmitter.pump());
     } while (bench.link.space == 0);
     const auto headers = bench.headers();
-    REQUIRE(headers.size() == 4);
+    REQUIRE(headers.size() == 5);
     const wire::Type order[] = {wire::Type::clock_answer, wire::Type::exposure,
-                                wire::Type::imu_sample, wire::Type::log};
-    for (std::uint32_t i = 0; i < 4; ++i) {
+                                wire::Type::imu_sample, wire::Type::sentence, wire::Type::log};
+    for (std::uint32_t i = 0; i < 5; ++i) {
         CHECK(headers[i].type == order[i]);
         CHECK(headers[i].sequence == i);
     }
@@ -116,6 +117,7 @@ TEST_CASE(
     for (int round = 0; round < 2; ++round) {
         expected.clear();
         fill<wire::Log>(transmitter, 9, 8, expected);
+        fill<wire::Sentence>(transmitter, 40, 32, expected);
         fill<wire::ImuSample>(transmitter, 258, 256, expected);
         fill<wire::Health>(transmitter, 4, 1, expected);
         fill<wire::Event>(transmitter, 132, 128, expected);
@@ -125,7 +127,7 @@ TEST_CASE(
         fill<wire::ClockAnswer>(transmitter, 16, 8, expected);
         fill<wire::ClockFollowUp>(transmitter, 10, 1, expected);
         fill<wire::BoardHello>(transmitter, 11, 1, expected);
-        CHECK(transmitter.take_high_water() == 708);
+        CHECK(transmitter.take_high_water() == 740);
 
         bench.link.bytes.clear();
         bench.link.space = 1'000'000;

@@ -13,7 +13,7 @@ from ._library import library_version
 from .errors import (Absent, Damaged, Error, Exhausted, Forbidden, Gone, Lost, NotTrusted, Nothing,
                      OtherEpoch, Overtaken, Pause, Released, Restarted, Unsupported, ViewEscaped,
                      WrongKind)
-from .items import Event, Flags, Frame, ImuSample, Item, Status
+from .items import Event, Flags, Frame, ImuSample, Item, NmeaSentence, Status
 from .sets import FrameSet, Sets, sets
 from .streams import (Stream, StreamInfo, list_streams, open,  # pylint: disable=redefined-builtin
                       wait)

@@ -11,7 +11,7 @@ NAME = "libversavis.so.1"
 OK, NOTHING, LOST, RESTARTED, GONE, OVERTAKEN = range(6)
 INVALID, NO_MEMORY, ABSENT, FORBIDDEN, NOT_TRUSTED, WRONG_KIND = range(-2, -8, -1)
 UNSUPPORTED, DAMAGED, EXHAUSTED, OTHER_EPOCH = range(-8, -12, -1)
-FRAMES, IMU, EVENTS, STATUS, EVIDENCE, CLOCK = range(1, 7)
+FRAMES, IMU, EVENTS, STATUS, EVIDENCE, CLOCK, NMEA = range(1, 8)
 POSITIONS = {None: 0, "next": 1, "latest": 2, "middle": 3, "oldest": 4}
 SIGMA_UNKNOWN = NO_EPOCH = 0xFFFFFFFF
 ANY_OWNER = -1
@@ -70,9 +70,16 @@ class EventData(ctypes.Structure):
     ]
 
 
+class NmeaData(ctypes.Structure):
+    _fields_ = [
+        ("board_time", c_int64), ("host_time", c_int64), ("number", c_uint64), ("sigma", c_uint32),
+        ("epoch", c_uint32), ("flags", c_uint32), ("reserved", c_uint32 * 15),
+    ]
+
+
 class ItemData(ctypes.Union):
     _fields_ = [("frame", FrameData), ("imu", ImuData), ("event", EventData),
-                ("words", c_uint64 * 12)]
+                ("nmea", NmeaData), ("words", c_uint64 * 12)]
 
 
 class Item(Sized):

@@ -300,6 +300,21 @@ class Event(Item):
         return self._item.data.event.source_name.decode("utf-8", "replace")
 
 
+class NmeaSentence(Item):
+    """A line of a GNSS receiver at the board."""
+
+    board_time = number("nmea", "board_time", "Its first bit arrived at the board; ns.")
+    host_time = number("nmea", "host_time", "CLOCK_MONOTONIC_RAW, ns.")
+    sentence = number("nmea", "number", "Lines since the board's boot.")
+    sigma = sigma_of("nmea")
+    flags = flags_of("nmea")
+
+    @property
+    def text(self):
+        """As "$GPRMC,...*6A". Raises Overtaken if the writer needed the memory."""
+        return self._copied().tobytes().decode("ascii", "replace")
+
+
 class Status(Item):
     """A status document."""
 
@@ -309,7 +324,7 @@ class Status(Item):
 
 
 KINDS = {library.FRAMES: Frame, library.IMU: ImuSample, library.EVENTS: Event,
-         library.STATUS: Status}
+         library.STATUS: Status, library.NMEA: NmeaSentence}
 
 
 def typed(held):

@@ -249,7 +249,7 @@ def opened(call, wait):
 
 def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_only=False,
          wait=0):
-    """Opens a stream, as "cam0", "imu0", "events" or "status".
+    """Opens a stream, as "cam0", "imu0", "events", "nmea0" or "status".
 
     instance: of the service; None: that of $VERSAVIS_INSTANCE, or "default".
     start, after_loss: "next", "latest", "middle" or "oldest": where to begin, and where to go on
@@ -284,7 +284,8 @@ class StreamInfo:
 
 
 KIND_NAMES = {library.FRAMES: "frames", library.IMU: "imu", library.EVENTS: "events",
-              library.STATUS: "status", library.EVIDENCE: "evidence", library.CLOCK: "clock"}
+              library.STATUS: "status", library.EVIDENCE: "evidence", library.CLOCK: "clock",
+              library.NMEA: "nmea"}
 
 
 def list_streams(instance=None, owner=None):

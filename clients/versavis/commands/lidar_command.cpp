@@ -17,6 +17,11 @@ LidarCommand::LidarCommand(CLI::App& app, std::function<bool()> stop)
     : command_(app.add_subcommand("lidar", "LiDARs that take their time from the board")),
       stop_(std::move(stop)) {
     command_->require_subcommand(1);
+    add_check();
+    add_phase();
+}
+
+void LidarCommand::add_check() {
     CLI::App* check = command_->add_subcommand(
         "check",
         "Show from the packets of LiDARs whether they follow the host's time, and how far off they "
@@ -32,7 +37,43 @@ LidarCommand::LidarCommand(CLI::App& app, std::function<bool()> stop)
     check->add_flag("--json", json_, "Print a JSON array");
 }
 
-int LidarCommand::run() const {
+void LidarCommand::add_phase() {
+    phase_ = command_->add_subcommand(
+        "phase",
+        "Compute phase_us of a camera that is to expose when a rotating LiDAR looks its way "
+        "(docs/user/lidar.md)");
+    phase_->add_option("azimuth", azimuth_, "Azimuth of the camera's axis, in degrees")->required();
+    phase_
+        ->add_option("--lock-azimuth", rotation_.lock_azimuth,
+                     "Azimuth at each whole second: the LiDAR's phase lock")
+        ->capture_default_str();
+    phase_->add_option("--rotation-hz", rotation_.rate_hz, "Turns per second")
+        ->check(CLI::Range(1, 100))
+        ->capture_default_str();
+    phase_->add_flag("--counterclockwise", rotation_.counterclockwise,
+                     "The azimuth falls while it turns");
+    phase_->add_option("--rate", rate_hz_, "The camera's rate_hz (default: one frame per turn)")
+        ->check(CLI::PositiveNumber);
+    phase_->add_flag("--json", json_, "Print one JSON object");
+}
+
+int LidarCommand::run() const { return phase_->parsed() ? run_phase() : run_check(); }
+
+int LidarCommand::run_phase() const {
+    const auto phase = lidar_phase(rotation_, azimuth_, rate_hz_);
+    if (!phase) return fail(phase.error(), EX_USAGE);
+    if (json_)
+        fmt::print("{{\"phase_us\": {:.3f}, \"frames_per_turn\": {}}}\n", phase->phase_us,
+                   phase->frames_per_turn);
+    else
+        fmt::print("phase_us = {:.3f}    # with align = true in [clock]{}\n", phase->phase_us,
+                   phase->frames_per_turn > 1
+                       ? fmt::format("; one of {} frames looks its way", phase->frames_per_turn)
+                       : "");
+    return EX_OK;
+}
+
+int LidarCommand::run_check() const {
     if (file_.empty() && interface_.empty())
         return fail(Error{"lidar check", "there is nothing to check",
                           "name a capture, or an interface with --interface"},

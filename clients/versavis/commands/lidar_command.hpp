@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The command `versavis lidar check`.
+// The commands `versavis lidar check` and `phase`.
 #pragma once
 
 #include <CLI/App.hpp>
 #include <functional>
 #include <string>
+
+#include "lidar/lidar_phase.hpp"
 
 namespace versavis::client {
 
@@ -21,12 +23,21 @@ class LidarCommand {
     int run() const;
 
  private:
+    void add_check();
+    void add_phase();
+    int run_check() const;
+    int run_phase() const;
+
     CLI::App* command_;
+    CLI::App* phase_ = nullptr;
     std::function<bool()> stop_;
     std::string file_;
     std::string interface_;
     double seconds_ = 10;
     bool json_ = false;
+    LidarRotation rotation_;
+    double azimuth_ = 0;
+    double rate_hz_ = 0;
 };
 
 }  // namespace versavis::client

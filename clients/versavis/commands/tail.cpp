@@ -43,6 +43,18 @@ json describe(const ImuSample& item) { return describe(ring::StreamKind::imu, it
 
 json describe(const Event& item) { return describe(ring::StreamKind::events, item); }
 
+std::string text_of(const ring::Payload& payload) {
+    std::string text(payload.size(), '\0');
+    if (!payload.copy_to(reinterpret_cast<std::byte*>(text.data()))) text.clear();
+    return text;
+}
+
+json describe(const NmeaSentence& item) {
+    json line = describe(ring::StreamKind::nmea, item);
+    line["text"] = text_of(item.payload);
+    return line;
+}
+
 json describe(const pairing::EvidenceItem& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const auto evidence = pairing::from_metadata(item.data);
@@ -59,9 +71,8 @@ json describe(const clock::StampItem& item) {
 
 /// The document itself, so that a script sees what the status command sees.
 json describe(const StatusDocument& item) {
-    std::string text(item.payload.size(), '\0');
     json line = describe(static_cast<const ring::Item&>(item));
-    if (item.payload.copy_to(reinterpret_cast<std::byte*>(text.data())))
+    if (const std::string text = text_of(item.payload); !text.empty())
         line["status"] = parse_shallow_json(text);
     return line;
 }
@@ -111,6 +122,7 @@ Expected<> tail(const TailSettings& settings) {
         case ring::StreamKind::frames: return print_stream<FrameStream>(settings);
         case ring::StreamKind::imu: return print_stream<ImuStream>(settings);
         case ring::StreamKind::events: return print_stream<EventStream>(settings);
+        case ring::StreamKind::nmea: return print_stream<NmeaStream>(settings);
         case ring::StreamKind::status: return print_stream<StatusStream>(settings);
         case ring::StreamKind::evidence: return print_stream<pairing::EvidenceStream>(settings);
         case ring::StreamKind::clock: return print_stream<clock::ClockStream>(settings);

@@ -3,18 +3,23 @@
 
 #include <fmt/format.h>
 
+#include "base/byte_cursor.hpp"
 #include "recording/item_fields.hpp"
 
 namespace versavis::client {
 
 std::string csv_columns(ring::StreamKind kind) {
     const std::string columns = field_columns(kind);
-    return columns.empty() ? "" : "time_ns,number,life" + columns;
+    if (columns.empty()) return "";
+    return "time_ns,number,life" + columns + (kind == ring::StreamKind::nmea ? ",text" : "");
 }
 
 std::string csv_row(const RecordedItem& item) {
-    return fmt::format("{},{},{:016x}{}", item.time.ns, item.number, item.life,
-                       field_row(item.kind, item.metadata, item.attributes));
+    std::string row = fmt::format("{},{},{:016x}{}", item.time.ns, item.number, item.life,
+                                  field_row(item.kind, item.metadata, item.attributes));
+    if (item.kind == ring::StreamKind::nmea)
+        row += "," + csv_text(std::string(as_text(item.payload)));
+    return row;
 }
 
 }  // namespace versavis::client

@@ -68,6 +68,10 @@ ItemWriter::Outcome ItemWriter::write(const std::string& stream, ring::StreamKin
     const ItemMessage message = message_of(kind, item, payload);
     if (kind == ring::StreamKind::imu) write_imu(channels, stream, item);
     if (kind == ring::StreamKind::events) write_event(channels, stream, message);
+    if (kind == ring::StreamKind::nmea)
+        file_.write({channel(channels, stream, ros_topic(stream, "/nmea_sentence"), sentence_type),
+                     channels.sequence, item.time.ns},
+                    ros_sentence(item.time.output(), stream, payload));
     if (kind == ring::StreamKind::status) write_status(channels, stream, item, payload);
     write_item(channels, stream, message);
     return Outcome::written;

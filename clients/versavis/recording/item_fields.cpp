@@ -39,14 +39,6 @@ void add(Json& line, ring::StreamKind kind, const ring::Metadata& metadata,
     }
 }
 
-/// In quotes where it needs them.
-std::string quoted(const std::string& text) {
-    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-    std::string result = "\"";
-    for (const char one : text) result += one == '"' ? "\"\"" : std::string(1, one);
-    return result + "\"";
-}
-
 std::string to_csv(const FieldValue& value) {
     return std::visit(
         [](const auto& known) -> std::string {
@@ -56,7 +48,7 @@ std::string to_csv(const FieldValue& value) {
             else if constexpr (std::is_same_v<T, bool>)
                 return known ? "1" : "0";
             else if constexpr (std::is_same_v<T, std::string>)
-                return quoted(known);
+                return csv_text(known);
             else
                 return fmt::format("{}", known);
         },
@@ -90,6 +82,13 @@ std::string field_row(ring::StreamKind kind, const ring::Metadata& metadata,
         for (unsigned i = 0; i < field.count; ++i)
             row += "," + to_csv(value_of(field, metadata, attributes, i));
     return row;
+}
+
+std::string csv_text(const std::string& text) {
+    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+    std::string result = "\"";
+    for (const char one : text) result += one == '"' ? "\"\"" : std::string(1, one);
+    return result + "\"";
 }
 
 }  // namespace versavis::client

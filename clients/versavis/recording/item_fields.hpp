@@ -22,4 +22,7 @@ std::string field_columns(ring::StreamKind kind);
 std::string field_row(ring::StreamKind kind, const ring::Metadata& metadata,
                       std::uint64_t attributes);
 
+/// In quotes where CSV needs them.
+std::string csv_text(const std::string& text);
+
 }  // namespace versavis::client

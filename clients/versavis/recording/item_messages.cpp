@@ -158,7 +158,7 @@ ChannelRole role_of(const McapChannel& channel) {
     if (!is_stream_name(found.stream)) return {};
     if (is_own && rest == "item") {
         const std::string kind = metadata_text(channel, "kind");
-        const bool known = kind.size() == 1 && kind[0] >= '1' && kind[0] <= '6';
+        const bool known = kind.size() == 1 && kind[0] >= '1' && kind[0] <= '7';
         if (!known || (found.old && channel.encoding != "versavis_item")) return {};
         found.kind = static_cast<ring::StreamKind>(kind[0] - '0');
         found.role = Role::item;

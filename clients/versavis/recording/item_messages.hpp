@@ -21,6 +21,7 @@ inline constexpr std::string_view item_type = "versavis_msgs/msg/Item";
 inline constexpr std::string_view stamp_type = "versavis_msgs/msg/Stamp";
 inline constexpr std::string_view event_type = "versavis_msgs/msg/Event";
 inline constexpr std::string_view gap_type = "versavis_msgs/msg/Gap";
+inline constexpr std::string_view sentence_type = "nmea_msgs/msg/Sentence";
 inline constexpr std::string_view text_type = "std_msgs/msg/String";
 
 /// What the messages of a channel are.

@@ -14,6 +14,7 @@ inline const char* kind_name(ring::StreamKind kind) {
         case ring::StreamKind::status: return "status";
         case ring::StreamKind::evidence: return "evidence";
         case ring::StreamKind::clock: return "clock";
+        case ring::StreamKind::nmea: return "nmea";
     }
     return "unknown";
 }

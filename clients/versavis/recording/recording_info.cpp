@@ -101,9 +101,9 @@ std::pair<OutputTime, OutputTime> extent(const std::vector<RecordedStream>& all,
         std::optional<std::pair<OutputTime, OutputTime>> found;
         for (const RecordedStream& stream : all) {
             const StreamFacts& its = streams.at(stream.name);
-            const bool has_stamps = stream.kind == StreamKind::frames ||
-                                    stream.kind == StreamKind::imu ||
-                                    stream.kind == StreamKind::events;
+            const bool has_stamps =
+                stream.kind == StreamKind::frames || stream.kind == StreamKind::imu ||
+                stream.kind == StreamKind::events || stream.kind == StreamKind::nmea;
             if (its.items == 0 || has_stamps != stamped) continue;
             if (!found) found.emplace(its.first, its.last);
             found->first = std::min(found->first, its.first);

@@ -50,6 +50,7 @@ const std::map<std::string_view, Definition>& definitions() {
          {"std_msgs/Header header\nfloat64 temperature\nfloat64 variance\n", {header}}},
         {"sensor_msgs/msg/TimeReference",
          {"std_msgs/Header header\nbuiltin_interfaces/Time time_ref\nstring source\n", {header}}},
+        {sentence_type, {"std_msgs/Header header\nstring sentence\n", {header}}},
         {text_type, {"string data\n", {}}},
         {item_type, {versavis_fields(item_type), {}}},
         {stamp_type, {versavis_fields(stamp_type), {header}}},
@@ -145,6 +146,10 @@ std::string ros_temperature(OutputTime time, std::string_view stream, const ImuM
         .number(static_cast<double>(sample.temperature))
         .number(0.0)
         .bytes();
+}
+
+std::string ros_sentence(OutputTime time, std::string_view stream, std::string_view text) {
+    return CdrWriter().header(time, stream).text(text).bytes();
 }
 
 std::string ros_utc(OutputTime time, OutputTime utc) {

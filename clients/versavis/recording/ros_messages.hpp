@@ -50,6 +50,9 @@ std::string ros_magnetic_field(OutputTime time, std::string_view stream, const I
 /// sensor_msgs/msg/Temperature.
 std::string ros_temperature(OutputTime time, std::string_view stream, const ImuMetadata& sample);
 
+/// nmea_msgs/msg/Sentence, without the end of the line.
+std::string ros_sentence(OutputTime time, std::string_view stream, std::string_view text);
+
 /// sensor_msgs/msg/TimeReference: the PPS pulse at `time` was named `utc`.
 std::string ros_utc(OutputTime time, OutputTime utc);
 

@@ -48,7 +48,7 @@ struct Fields {
     const Field* end() const { return first + count; }
 };
 
-/// Of frames, IMU samples and events; none of other kinds.
+/// Of frames, IMU samples, events and sentences; none of other kinds.
 VERSAVIS_API Fields fields_of(ring::StreamKind kind);
 
 /// None: unknown.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a descriptor says of a frame, an IMU sample or an event: the 96 bytes of inline metadata.
+// What a descriptor says of a frame, a sample, an event or a sentence: 96 bytes of inline metadata.
 #pragma once
 
 #include <cstdint>
@@ -170,9 +170,21 @@ struct EventMetadata {
     std::uint32_t reserved;
 };
 
+/// Of a line that a GNSS receiver at the board sent; the line is the item's payload.
+struct NmeaMetadata {
+    BoardTime board_time;  ///< its first bit arrived at the board
+    HostTime host_time;
+    std::uint64_t number;  ///< lines since the board's boot
+    std::uint32_t sigma_ns;
+    std::uint32_t epoch;
+    std::uint32_t flags;  ///< ItemFlag; flag_sensor_error: its checksum is wrong, or there is none
+    std::uint32_t reserved[15];
+};
+
 static_assert(sizeof(FrameMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 static_assert(sizeof(ImuMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 static_assert(sizeof(EventMetadata) == ring::metadata_size, "96 bytes of inline metadata");
+static_assert(sizeof(NmeaMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 
 /// As attributes of a frame's payload.
 inline std::uint64_t pack(const SensorState& state) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reading a stream by its name: frames, IMU samples, events or the status document.
+// Reading a stream by its name: frames, IMU samples, events, sentences or the status document.
 #pragma once
 
 #include <optional>
@@ -45,6 +45,7 @@ struct Frame : Typed<FrameMetadata> {
 
 using ImuSample = Typed<ImuMetadata>;
 using Event = Typed<EventMetadata>;
+using NmeaSentence = Typed<NmeaMetadata>;      ///< the payload is the line, without its end
 using StatusDocument = Typed<ring::Metadata>;  ///< the payload is the document
 
 /// Where a stream is found, and how it is read.
@@ -107,6 +108,7 @@ VERSAVIS_API Expected<std::vector<StreamInfo>> list_streams(const StreamOptions&
 using FrameStream = Stream<Frame, ring::StreamKind::frames>;
 using ImuStream = Stream<ImuSample, ring::StreamKind::imu>;
 using EventStream = Stream<Event, ring::StreamKind::events>;
+using NmeaStream = Stream<NmeaSentence, ring::StreamKind::nmea>;
 using StatusStream = Stream<StatusDocument, ring::StreamKind::status>;
 
 }  // namespace versavis
