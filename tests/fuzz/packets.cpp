@@ -38,6 +38,7 @@ class Service {
         use<wire::ClockAnswer>(packet, [&](const auto& answer) { exchange(answer); });
         use<wire::Health>(packet, [](const auto&) {});
         use<wire::ClockFollowUp>(packet, [](const auto&) {});
+        use<wire::Sentence>(packet, [](const auto&) {});
     }
 
  private:

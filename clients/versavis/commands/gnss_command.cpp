@@ -27,9 +27,10 @@ GnssCommand::GnssCommand(CLI::App& app)
         ->check(CLI::Range(0, 255))
         ->capture_default_str();
     match->add_flag("--falling", falling_, "The falling edge marks the exposure");
-    match->add_option("--leap-seconds", settings_.leap_seconds, "GPS time less UTC, in s")
-        ->check(CLI::Range(0, 60))
-        ->capture_default_str();
+    match
+        ->add_option("--leap-seconds", settings_.leap_seconds,
+                     "Of marks in GNSS time: how many seconds that is ahead of UTC (GPS: 18)")
+        ->check(CLI::Range(0, 60));
     match->add_option("-o,--csv", csv_, "Write a row for each frame with a mark to this file");
     match->add_flag("--json", json_, "Print the report as one JSON object");
 }

@@ -145,12 +145,16 @@ Expected<GnssMatchReport> match_gnss(const Recording& recording, const UbxMarks&
     report.marks = usable_marks.size();
     std::vector<Duration> times;
     times.reserve(usable_marks.size());
-    for (const TimeMark& mark : usable_marks) times.push_back(as_utc(mark, settings.leap_seconds));
+    for (const TimeMark& mark : usable_marks)
+        times.push_back(as_utc(mark, settings.leap_seconds.value_or(0)));
+    const bool is_utc = report.base == TimeBase::utc ||
+                        (report.base == TimeBase::gnss && settings.leap_seconds.has_value());
     for (auto& [run, its] : recorded->frames) {
         GnssSequence sequence{run.first, run.second, its.frames.size()};
-        const auto labels = report.base == TimeBase::receiver ? std::vector<ClockRelation>{}
-                                                              : recorded->labels[run];
-        const auto match = match_marks(its.markable, times, labels);
+        const auto& labels = recorded->labels[run];
+        const auto match = match_marks(
+            its.markable, times,
+            is_utc ? std::span<const ClockRelation>(labels) : std::span<const ClockRelation>());
         if (match) {
             sequence.match = *match;
             std::vector<Duration> offsets;
@@ -163,6 +167,12 @@ Expected<GnssMatchReport> match_gnss(const Recording& recording, const UbxMarks&
             measure(offsets, sequence);
         } else {
             sequence.failure = match.error().message();
+            // Another system's time fits at a wrong second just as well.
+            if (!labels.empty() && !is_utc)
+                sequence.failure +=
+                    "; or set the receiver's time base to UTC, or say its seconds ahead of UTC "
+                    "with "
+                    "--leap-seconds (GPS, Galileo: 18)";
         }
         report.sequences.push_back(std::move(sequence));
     }

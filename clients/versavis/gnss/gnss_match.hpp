@@ -17,8 +17,9 @@ namespace versavis::client {
 struct GnssMatchSettings {
     std::string camera{};  ///< empty: the only one
     MarkEdge edge = MarkEdge::rising;
-    unsigned channel = 0;   ///< EXTINT pin
-    int leap_seconds = 18;  ///< GPS time less UTC, since 2017
+    unsigned channel = 0;  ///< EXTINT pin
+    /// The receiver's GNSS time less UTC; none: it is not known of which system it is.
+    std::optional<int> leap_seconds{};
 };
 
 /// Frames of one run of the service between two steps of its clocks.
@@ -28,7 +29,8 @@ struct GnssSequence {
     std::uint64_t frames = 0;
     MarkMatch match{};
     std::string failure{};  ///< why there is no match
-    /// Mark less stamp, as UTC where the time base tells; its mean and what it varies by (rms).
+    /// Mark less stamp, its mean and what it varies by (rms). Of GNSS time without leap seconds, as
+    /// if it were UTC.
     Duration offset{};
     Duration spread{};
 };

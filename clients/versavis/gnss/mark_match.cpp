@@ -246,8 +246,8 @@ class Matching {
             return failure(fmt::format("only {} of {} exposures between the first mark and the "
                                        "last have one",
                                        fit.pairs.size(), between),
-                           "u-blox reports one mark per navigation epoch: set its rate to that of "
-                           "the camera or above");
+                           "u-blox reports one mark per measurement: set its rate to that of the "
+                           "camera or above");
         return match;
     }
 

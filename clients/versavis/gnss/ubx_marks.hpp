@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Time marks of a u-blox receiver: edges at its EXTINT pin, as its messages UBX-TIM-TM2 report them
-// (u-blox F9 interface description, UBX-22008968).
+// (ZED-F9P interface description, UBX-18010854).
 #pragma once
 
 #include <cstddef>
@@ -15,6 +15,7 @@ inline constexpr std::int64_t gps_week_ns = 604'800'000'000'000;
 enum class MarkEdge { rising, falling };
 
 /// What a mark's time counts in.
+/// GNSS time is that of the system that the receiver is set to.
 enum class TimeBase : std::uint8_t { receiver = 0, gnss = 1, utc = 2 };
 
 struct TimeMark {
