@@ -19,7 +19,7 @@ GnssCommand::GnssCommand(CLI::App& app)
     CLI::App* match = command_->add_subcommand(
         "match",
         "Give each frame of a recording the time mark that a u-blox receiver made of its pulse "
-        "(UBX-TIM-TM2). Exits 65 if one cannot be told from another (docs/user/gnss.md)");
+        "(UBX-TIM-TM2). Exits 65 where more than one mark could be meant (docs/user/gnss.md)");
     match->add_option("recording", recording_, "Recording (versavis record)")->required();
     match->add_option("marks", marks_, "Output of the receiver: a .ubx file")->required();
     match->add_option("--camera", settings_.camera, "Camera (default: the only one)");

@@ -14,7 +14,7 @@ namespace {
 /// pulse lies where the middle of the exposure was planned, and clocks drift between two frames.
 constexpr Duration largest_distance = milliseconds(2);
 
-/// Of the shortest gap: the next frame is never as near.
+/// Of the usual gap: the next frame is never as near.
 constexpr std::int64_t gap_parts = 4;
 
 /// Marks that are compared for their gaps. If lower, chance fits; if higher, one that is lost
@@ -128,7 +128,7 @@ class Matching {
     }
 
  private:
-    /// Also those whose frames are missing, as trigger numbers tell: else a wrong place where by
+    /// Also those whose frames are missing, by the trigger numbers: else a wrong place where by
     /// chance marks and frames are missing together would fit better than the right one.
     std::vector<Pulse> all_pulses(std::span<const MarkableFrame> frames) const {
         std::vector<Pulse> pulses;
