@@ -107,11 +107,7 @@ Expected<> Service::make_rings() {
             std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_, *events_));
     }
     if (!configuration_.ports.nmea) return {};
-    auto ring = NmeaPipeline::make_ring(place);
-    if (!ring) return Unexpected(ring.error());
-    nmea_ = std::make_unique<NmeaPipeline>(configuration_.ports.nmea_baud, std::move(*ring),
-                                           translator_);
-    return {};
+    return nmea_.configure(place, configuration_.ports.nmea_baud);
 }
 
 Expected<> Service::make_cameras() {
@@ -154,6 +150,11 @@ void Service::reconfigure(const Configuration& configuration) {
     const Configuration after = for_board(configuration, cameras_->presets());
     const wire::Configuration old_board = board_configuration(before);
     const wire::Configuration new_board = board_configuration(after);
+    if (configuration.ports.nmea)
+        if (const auto made =
+                nmea_.configure(place_of(directory_, configuration), configuration.ports.nmea_baud);
+            !made)
+            log(LogLevel::error, nmea_stream, "{}", made.error().message());
     if (std::memcmp(&old_board, &new_board, sizeof new_board) != 0) {
         alignment_.reconfigure(new_board);
         board_->reconfigure(after);
@@ -182,7 +183,7 @@ Service::~Service() {
 /// Before the clock is: no record of the old life may be translated by the new clock.
 void Service::board_restarted() {
     for (auto& imu : imus_) imu->board_restarted();
-    if (nmea_) nmea_->board_restarted();
+    nmea_.board_restarted();
     cameras_->board_restarted();
 }
 
@@ -229,7 +230,7 @@ bool Service::imu_sample(const wire::ImuSample& sample, HostTime received) {
 }
 
 void Service::sentence(const wire::Sentence& sentence, HostTime received) {
-    if (nmea_) nmea_->add(sentence, received);
+    nmea_.add(sentence, received);
 }
 
 void Service::exchange_doubted(const Implausibility& doubt) {
@@ -300,7 +301,7 @@ void Service::tick() {
     cameras_->tick(now);
     if (board_->running()) announce(now);
     for (auto& imu : imus_) imu->heartbeat(now);
-    if (nmea_) nmea_->heartbeat(now);
+    nmea_.heartbeat(now);
     events_->heartbeat(now);
     clock_recorder_->tick(now);
     directory_.epochs().keep(translator_.output_now().epoch);
@@ -354,10 +355,8 @@ Status Service::collect_status(HostTime now) {
         const ImuReport& report = status.imus.back().report;
         status.streams.push_back({report.name, "imu", report.published});
     }
-    if (nmea_) {
-        status.nmea = nmea_->report();
-        status.streams.push_back({nmea_stream, "nmea", status.nmea->sentences});
-    }
+    status.nmea = nmea_.report();
+    if (status.nmea) status.streams.push_back({nmea_stream, "nmea", status.nmea->sentences});
     status.streams.push_back({"events", "events", events_->items()});
     status.streams.push_back({"clock", "clock", clock_recorder_->items()});
     return status;

@@ -99,7 +99,7 @@ class Service final : public Controlled, private BoardListener {
     EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
-    std::unique_ptr<NmeaPipeline> nmea_;  ///< null: no receiver is configured
+    NmeaPipeline nmea_{translator_};
     std::unique_ptr<BoardLink> board_;
     std::unique_ptr<CameraGroup> cameras_;
     std::atomic<bool> unkept_{false};  ///< the board could not store its configuration

@@ -31,15 +31,20 @@ bool has_right_checksum(std::string_view sentence) {
     return end == fmt::format("*{:02X}", sum) || end == fmt::format("*{:02x}", sum);
 }
 
-Expected<ring::Writer> NmeaPipeline::make_ring(const ring::Place& place) {
-    return ring::Writer::create(place, {nmea_stream, ring::StreamKind::nmea, sentences_kept,
-                                        sentences_kept, wire::max_sentence_text});
+Expected<> NmeaPipeline::configure(const ring::Place& place, std::uint32_t baud) {
+    std::optional<ring::Writer> made;  // without the lock: memory takes its time
+    if (!report()) {
+        auto ring =
+            ring::Writer::create(place, {nmea_stream, ring::StreamKind::nmea, sentences_kept,
+                                         sentences_kept, wire::max_sentence_text});
+        if (!ring) return Unexpected(ring.error());
+        made = std::move(*ring);
+    }
+    const std::lock_guard lock(mutex_);
+    if (made) ring_ = std::move(made);
+    sigma_ = seconds(uncertain_bits) / static_cast<std::int64_t>(baud);
+    return {};
 }
-
-NmeaPipeline::NmeaPipeline(std::uint32_t baud, ring::Writer ring, clock::Translator& translator)
-    : sigma_(seconds(uncertain_bits) / static_cast<std::int64_t>(baud)),
-      ring_(std::move(ring)),
-      translator_(translator) {}
 
 void NmeaPipeline::board_restarted() {
     const std::lock_guard lock(mutex_);
@@ -48,6 +53,7 @@ void NmeaPipeline::board_restarted() {
 
 void NmeaPipeline::add(const wire::Sentence& sentence, HostTime received) {
     const std::lock_guard lock(mutex_);
+    if (!ring_) return;
     const BoardTime began{sentence.time_ns};
     const bool doubted = contradicts_arrival(began, received, translator_).has_value();
     auto stamp = doubted ? std::nullopt : translator_.translate(began);
@@ -78,19 +84,19 @@ void NmeaPipeline::add(const wire::Sentence& sentence, HostTime received) {
     report_.damaged += damaged ? 1 : 0;
     report_.suspect += suspect ? 1 : 0;
 
-    const auto slot = ring_.acquire();
-    std::memcpy(ring_.slot_data(*slot), text.data(), text.size());
-    ring_.publish(*slot, static_cast<std::uint32_t>(text.size()), guarded->time, pack(metadata));
+    const auto slot = ring_->acquire();
+    std::memcpy(ring_->slot_data(*slot), text.data(), text.size());
+    ring_->publish(*slot, static_cast<std::uint32_t>(text.size()), guarded->time, pack(metadata));
 }
 
 void NmeaPipeline::heartbeat(HostTime now) {
     const std::lock_guard lock(mutex_);
-    ring_.heartbeat(now);
+    if (ring_) ring_->heartbeat(now);
 }
 
-NmeaReport NmeaPipeline::report() const {
+std::optional<NmeaReport> NmeaPipeline::report() const {
     const std::lock_guard lock(mutex_);
-    return report_;
+    return ring_ ? std::optional(report_) : std::nullopt;
 }
 
 }  // namespace versavis::daemon

@@ -9,11 +9,10 @@
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
 #include "publish/stamp_guard.hpp"
+#include "settings/configuration.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::daemon {
-
-inline constexpr const char* nmea_stream = "nmea0";
 
 struct NmeaReport {
     std::uint64_t sentences = 0;  ///< published
@@ -26,24 +25,27 @@ struct NmeaReport {
 /// The end of a sentence is the checksum of what lies before it.
 bool has_right_checksum(std::string_view sentence);
 
-/// Thread-safe: the link's thread adds, the main thread reports.
+/// Thread-safe: the link's thread adds, the main thread does the rest.
 class NmeaPipeline {
  public:
-    static Expected<ring::Writer> make_ring(const ring::Place& place);
+    explicit NmeaPipeline(clock::Translator& translator) : translator_(translator) {}
 
-    /// `baud`: of the receiver, by which the board's stamps of bytes are uncertain.
-    NmeaPipeline(std::uint32_t baud, ring::Writer ring, clock::Translator& translator);
+    /// Makes the ring, unless there is one; sentences that come before are dropped. `baud`: of the
+    /// receiver, by which the board's stamps of bytes are uncertain.
+    Expected<> configure(const ring::Place& place, std::uint32_t baud);
 
     void board_restarted();
     void add(const wire::Sentence& sentence, HostTime received);
     void heartbeat(HostTime now);
-    NmeaReport report() const;
+
+    /// None: it was not configured.
+    std::optional<NmeaReport> report() const;
 
  private:
-    const Duration sigma_;
-    mutable std::mutex mutex_;
-    ring::Writer ring_;
     clock::Translator& translator_;
+    mutable std::mutex mutex_;
+    std::optional<ring::Writer> ring_;
+    Duration sigma_;  ///< of the board's stamps
     std::optional<std::uint32_t> last_sequence_;
     StampGuard guard_;
     NmeaReport report_;

@@ -26,6 +26,9 @@ namespace versavis::daemon {
 /// The ring of all that the pairing of a camera gets is named after the camera.
 inline const std::string evidence_suffix = "-evidence";
 
+/// Of the sentences of a GNSS receiver.
+inline constexpr const char* nmea_stream = "nmea0";
+
 // Each table knows its place in the file, for what is found out after reading, and by the board.
 
 struct BoardConfiguration {

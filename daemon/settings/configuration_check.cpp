@@ -104,7 +104,7 @@ void check_names(const Configuration& configuration, Findings& findings) {
     for (const auto& imu : configuration.imus) all.push_back({imu.entry, imu.name});
     for (const auto& output : configuration.time_outputs)
         all.push_back({output.entry, output.name});
-    const std::vector<std::string> taken{"clock", "events", "status"};
+    const std::vector<std::string> taken{"clock", "events", "status", nmea_stream};
     for (const auto& [entry, name] : all) {
         const std::size_t stem = name.size() - std::min(name.size(), evidence_suffix.size());
         if (name.empty())

@@ -247,6 +247,8 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
           "2:8: the name 'events' is reserved for a stream of the service; choose another name"},
          {camera_section("status", 0),
           "2:8: the name 'status' is reserved for a stream of the service; choose another name"},
+         {camera_section("nmea0", 0),
+          "2:8: the name 'nmea0' is reserved for a stream of the service; choose another name"},
          {camera_section("cam0-evidence", 0),
           "2:8: the name 'cam0-evidence' is reserved for a stream of the service; choose another "
           "name"},

@@ -45,5 +45,10 @@ TEST_CASE("lidar_phase: one frame in each turn, or in each of some turns, sees w
 TEST_CASE("lidar_phase: rates that do not stay together are refused") {
     for (const double rate : {7.0, 15.0, 29.97, 3.0})
         CHECK_FALSE(lidar_phase({0, 10, false}, 0, rate));
+    for (const double angle : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+        CHECK_FALSE(lidar_phase({0, 10, false}, angle, 0));
+        CHECK_FALSE(lidar_phase({angle, 10, false}, 0, 0));
+    }
+    CHECK_FALSE(lidar_phase({0, 10, false}, 0, std::nan("")));
     for (const double rate : {2.0, 2.5, 10.0, 40.0}) CHECK(lidar_phase({0, 10, false}, 0, rate));
 }

@@ -27,8 +27,14 @@ wire::Sentence sentence(const std::string& text, std::uint32_t sequence, BoardTi
 }
 
 struct NmeaBench : test::Pipelines {
-    NmeaPipeline pipeline{baud, *NmeaPipeline::make_ring(directory.path()), translator};
-    ring::Reader nmea = reader(nmea_stream);
+    NmeaPipeline pipeline{translator};
+    std::optional<ring::Reader> nmea;
+
+    NmeaBench() { configure(baud); }
+    void configure(std::uint32_t rate) {
+        REQUIRE(pipeline.configure(directory.path(), rate));
+        if (!nmea) nmea = reader(nmea_stream);
+    }
 
     /// Its first bit at `at`, here a second later.
     void add(const std::string& text, std::uint32_t sequence, HostTime at) {
@@ -36,7 +42,7 @@ struct NmeaBench : test::Pipelines {
     }
 
     std::pair<std::string, ring::Item> next() {
-        auto item = nmea.next();
+        auto item = nmea->next();
         REQUIRE(item);
         std::string text(item->payload.size(), '\0');
         REQUIRE(item->payload.copy_to(reinterpret_cast<std::byte*>(text.data())));
@@ -78,7 +84,7 @@ TEST_CASE("nmea_pipeline: without a clock, and where its time cannot be, its arr
         CHECK(data.host_time == start + arrived);
     }
     CHECK(unpack<NmeaMetadata>(bench.next().second.metadata).flags == 0);
-    CHECK(bench.pipeline.report().suspect == 2);
+    CHECK(bench.pipeline.report()->suspect == 2);
 }
 
 TEST_CASE("nmea_pipeline: damage and losses are counted, and a board that restarts loses nothing") {
@@ -88,10 +94,10 @@ TEST_CASE("nmea_pipeline: damage and losses are counted, and a board that restar
     bench.add("$GPZDA,201530.00,04,07,2002,00,00*61", 2, start + seconds(2));  // 0 and 1 are lost
     bench.pipeline.board_restarted();
     bench.add("!AIVDM", 5, start + seconds(3));
-    CHECK(bench.pipeline.report().sentences == 3);
-    CHECK(bench.pipeline.report().damaged == 2);
-    CHECK(bench.pipeline.report().lost == 2);
-    CHECK(bench.pipeline.report().suspect == 0);
+    CHECK(bench.pipeline.report()->sentences == 3);
+    CHECK(bench.pipeline.report()->damaged == 2);
+    CHECK(bench.pipeline.report()->lost == 2);
+    CHECK(bench.pipeline.report()->suspect == 0);
     CHECK(unpack<NmeaMetadata>(bench.next().second.metadata).flags == 0);
     CHECK(unpack<NmeaMetadata>(bench.next().second.metadata).flags == flag_sensor_error);
     CHECK(unpack<NmeaMetadata>(bench.next().second.metadata).flags == flag_sensor_error);
@@ -104,4 +110,21 @@ TEST_CASE("nmea_pipeline: checksums of sentences as receivers send them") {
     for (const char* bad : {"", "$", "$*", "$*0", "*00", "$GP", "$GPZDA*60 ", "$PUBX,40*5B"})
         CHECK_FALSE(has_right_checksum(bad));
     CHECK(has_right_checksum("$*00"));
+}
+
+TEST_CASE("nmea_pipeline: without a configuration nothing is published, and a new one goes on") {
+    test::Pipelines none;
+    NmeaPipeline idle{none.translator};
+    idle.add(sentence(good, 1, {}), start);
+    idle.heartbeat(start);
+    CHECK_FALSE(idle.report());
+    NmeaBench bench;
+    bench.synchronise(start);
+    bench.add(good, 1, start + seconds(1));
+    bench.configure(115'200);
+    bench.add(good, 2, start + seconds(2));
+    CHECK(unpack<NmeaMetadata>(bench.next().second.metadata).sigma_ns >= two_characters.ns);
+    const auto second = unpack<NmeaMetadata>(bench.next().second.metadata);
+    CHECK(second.number == 2);
+    CHECK(second.sigma_ns < two_characters.ns / 4);
 }

@@ -53,7 +53,7 @@ void LidarCommand::add_phase() {
     phase_->add_flag("--counterclockwise", rotation_.counterclockwise,
                      "The azimuth falls while it turns");
     phase_->add_option("--rate", rate_hz_, "The camera's rate_hz (default: one frame per turn)")
-        ->check(CLI::PositiveNumber);
+        ->check(CLI::Range(0.1, 1000.0));
     phase_->add_flag("--json", json_, "Print one JSON object");
 }
 

@@ -18,6 +18,8 @@ bool is_whole(double number) { return std::abs(number - std::round(number)) < wh
 
 Expected<LidarPhase> lidar_phase(const LidarRotation& rotation, double azimuth,
                                  double camera_rate_hz) {
+    if (!std::isfinite(azimuth) || !std::isfinite(rotation.lock_azimuth))
+        return failure("the azimuth", "is no angle", "give degrees, as -90 or 359.5");
     const double turns_hz = rotation.rate_hz;
     const double rate_hz = camera_rate_hz == 0 ? turns_hz : camera_rate_hz;
     const bool more = rate_hz >= turns_hz;
