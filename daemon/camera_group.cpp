@@ -11,13 +11,15 @@ CameraGroup::CameraGroup(const ring::Place& rings, std::vector<CameraPreset> pre
     : environment_(rings, std::move(presets), state_directory),
       translator_(translator),
       events_(events),
-      board_(board) {}
+      board_(board),
+      ptp_(translator) {}
 
 void CameraGroup::add(const CameraConfiguration& configuration) {
     const auto index = static_cast<std::uint32_t>(units_.size());
     Unit unit;
     unit.configuration = configuration;
-    unit.pipeline = std::make_unique<CameraPipeline>(configuration, index, translator_, events_);
+    unit.pipeline =
+        std::make_unique<CameraPipeline>(configuration, index, translator_, events_, &ptp_);
     unit.camera = std::make_unique<Camera>(configuration, environment_, *unit.pipeline,
                                            hooks(configuration, *unit.pipeline, index));
     units_.push_back(std::move(unit));
@@ -146,6 +148,12 @@ const CameraGroup::Unit* CameraGroup::at_output(unsigned output) const {
 bool CameraGroup::any_triggered() const {
     return std::any_of(units_.begin(), units_.end(),
                        [](const Unit& unit) { return unit.pipeline->triggered(); });
+}
+
+std::optional<PtpReport> CameraGroup::ptp() {
+    PtpReport report = ptp_.report();
+    if (report.clocks.empty()) return std::nullopt;
+    return report;
 }
 
 std::vector<CameraStatus> CameraGroup::status() const {

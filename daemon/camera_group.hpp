@@ -61,6 +61,7 @@ class CameraGroup {
     const std::vector<CameraPreset>& presets() const { return environment_.presets; }
     std::vector<CameraStatus> status() const;
     std::vector<StreamStatus> streams() const;
+    std::optional<PtpReport> ptp();  ///< none: no camera is triggered by it
 
  private:
     struct Unit {
@@ -81,6 +82,7 @@ class CameraGroup {
     clock::Translator& translator_;
     EventJournal& events_;
     BoardLink& board_;
+    PtpClocks ptp_;
     std::vector<Unit> units_;
 };
 

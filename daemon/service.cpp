@@ -350,6 +350,7 @@ Status Service::collect_status(HostTime now) {
         status.time_outputs.push_back({std::move(report)});
     status.cameras = cameras_->status();
     status.streams = cameras_->streams();
+    status.ptp = cameras_->ptp();
     for (auto& imu : imus_) {
         status.imus.push_back({imu->report()});
         const ImuReport& report = status.imus.back().report;

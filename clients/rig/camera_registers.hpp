@@ -51,6 +51,14 @@ enum Register : std::uint32_t {
     reg_event_selector = 0x10074,
     reg_event_notification = 0x10078,  ///< one register for each event
     reg_gain_auto = 0x10090,
+    reg_ptp_enable = 0x10094,
+    reg_ptp_slave_only = 0x10098,
+    reg_ptp_latch = 0x1009C,  ///< what follows is of its newest write
+    reg_ptp_status = 0x100A0,
+    reg_ptp_offset = 0x100A4,
+    reg_ptp_grandmaster = 0x100A8,
+    reg_clock_latch = 0x100AC,
+    reg_action_selector = 0x100B0,
 
     reg_model = 0x11000,  ///< from here on, what a model has of its own
     reg_xml = 0x20000,

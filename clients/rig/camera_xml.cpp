@@ -81,6 +81,14 @@ void XmlWriter::boolean(const std::string& name, std::uint32_t address) {
     add_register("IntReg", name, at(address), "RW");
 }
 
+void XmlWriter::wide_integer(const std::string& name, std::uint32_t address) {
+    feature("Integer", name);
+    nodes_ += fmt::format(
+        "<IntReg Name=\"{}Register\">{}<Length>8</Length><AccessMode>RO</AccessMode>"
+        "<pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
+        name, at(address));
+}
+
 void XmlWriter::event(const std::string& name, std::uint32_t id) {
     nodes_ += fmt::format("<Port Name=\"Event{}Port\"><EventID>{:x}</EventID></Port>\n", name, id);
 }
@@ -111,7 +119,8 @@ void XmlWriter::rig_features(const CameraFamily& family) {
     real("AcquisitionFrameRate", reg_frame_rate, "Hz", 0.1, 1000);
     enumeration("TriggerSelector", reg_trigger_selector, {{"FrameStart", 0}});
     enumeration("TriggerMode", reg_trigger_mode, {{"Off", 0}, {"On", 1}});
-    enumeration("TriggerSource", reg_trigger_source, {{"Software", 0}, {"Line0", 1}});
+    enumeration("TriggerSource", reg_trigger_source,
+                {{"Software", 0}, {"Line0", 1}, {"Action0", 2}});
     enumeration("TriggerActivation", reg_trigger_activation,
                 {{"RisingEdge", 0}, {"FallingEdge", 1}});
     enumeration("TriggerOverlap", reg_trigger_overlap, {{"Off", 0}, {"ReadOut", 1}});

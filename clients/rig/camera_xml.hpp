@@ -26,6 +26,8 @@ class XmlWriter {
                      const std::string& selector = "");
     void command(const std::string& name, std::uint32_t address);
     void boolean(const std::string& name, std::uint32_t address);
+    /// Of 64 bits, that can only be read.
+    void wide_integer(const std::string& name, std::uint32_t address);
     void event(const std::string& name, std::uint32_t id);
     void chunk_real(const std::string& name, std::uint32_t id);
 

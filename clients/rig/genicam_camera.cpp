@@ -2,12 +2,14 @@
 #include "genicam_camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <iterator>
 #include <utility>
 
 #include "bytes.hpp"
+#include "gige_registers.hpp"
 
 namespace versavis::rig {
 
@@ -30,6 +32,11 @@ HostTime stamped(const CameraScenario& camera, HostTime start, HostTime end) {
     }
 }
 
+PtpFollower::Settings ptp_settings(const CameraScenario& camera) {
+    return {camera.clock, Duration{std::llround(camera.ptp_lock_s * 1e9)},
+            std::llround(camera.ptp_error_ns), std::llround(camera.ptp_swing_ns)};
+}
+
 }  // namespace
 
 GenicamCamera::GenicamCamera(const World& world, const CameraScenario& settings,
@@ -38,8 +45,9 @@ GenicamCamera::GenicamCamera(const World& world, const CameraScenario& settings,
     : settings_(settings),
       faults_(faults_of(world.scenario, settings.name)),
       zero_(world.zero),
+      ahead_of_utc_s_(world.scenario.ptp.ahead_of_utc_s),
       truth_(world.truth),
-      clock_(world.zero, settings.clock),
+      clock_(world.zero, world.scenario.ptp, ptp_settings(settings)),
       family_(family),
       chunk_order_(memory.chunk_order),
       registers_(settings, family, std::move(memory)),
@@ -64,6 +72,12 @@ GenicamCamera::Written GenicamCamera::write(std::uint32_t address,
         case reg_trigger_software:
             if (registers_.value(reg_trigger_source) == 0) expose(host_now(), nullptr);
             break;
+        case reg_ptp_enable:
+            clock_.enable(registers_.value(reg_ptp_enable) != 0, host_now());
+            latch_ptp();
+            break;
+        case reg_ptp_latch: latch_ptp(); break;
+        case reg_clock_latch: latch_clock(); break;
         default: break;
     }
     return Written::done;
@@ -76,7 +90,7 @@ void GenicamCamera::send_event(CameraEventId id, HostTime at, std::uint64_t bloc
 }
 
 std::uint64_t GenicamCamera::ticks(HostTime at) const {
-    const std::int64_t ns = clock_.device_ns(at) + clock_step_ns_;
+    const std::int64_t ns = clock_.device_ns(at);
     if (settings_.clock_rate == 1) return static_cast<std::uint64_t>(ns);
     return static_cast<std::uint64_t>(std::llround(static_cast<double>(ns) * settings_.clock_rate));
 }
@@ -92,6 +106,7 @@ void GenicamCamera::stop_acquisition() {
     {
         const std::lock_guard lock(mutex_);
         acquiring_ = false;
+        actions_.clear();
     }
     queue_.clear();
     transport_.forget_frames();
@@ -100,10 +115,64 @@ void GenicamCamera::stop_acquisition() {
 void GenicamCamera::restart() {
     stop_acquisition();
     registers_.reset();
+    clock_.enable(false, host_now());
+}
+
+void GenicamCamera::latch_ptp() {
+    const HostTime now = host_now();
+    const PtpPort port = clock_.port(now);
+    const bool follows = port == PtpPort::slave;
+    registers_.write(reg_ptp_status, static_cast<std::uint32_t>(port));
+    registers_.write(reg_ptp_offset,
+                     follows ? static_cast<std::uint32_t>(clock_.offset_ns(now)) : 0);
+    registers_.write(reg_ptp_grandmaster, follows ? 0x00A1B2C3 : 0);
+}
+
+void GenicamCamera::latch_clock() {
+    std::array<std::uint8_t, sizeof(std::uint64_t)> wire{};
+    store_number(wire, ticks(host_now()), std::endian::big);
+    registers_.write(std::uint64_t{reg_clock_latched}, wire);
+}
+
+GenicamCamera::Action GenicamCamera::schedule(std::uint64_t ticks_then) {
+    const HostTime now = host_now();
+    if (clock_.port(now) != PtpPort::slave) return Action::no_time;
+    const HostTime at = clock_.host(static_cast<std::int64_t>(ticks_then));
+    const std::lock_guard lock(mutex_);
+    if (registers_.value(reg_trigger_mode) != 1 || registers_.value(reg_trigger_source) != 2)
+        return Action::taken;  // and nothing listens to it
+    if (at <= now) {
+        actions_.push_back(now);
+        return Action::late;
+    }
+    if (actions_.size() >= action_queue_size) return Action::queue_full;
+    const double jitter_us =
+        std::uniform_real_distribution(0.0, std::max(settings_.action_jitter_us, 1e-9))(random_);
+    actions_.push_back(at + Duration{std::llround(jitter_us * 1e3)});
+    return Action::taken;
+}
+
+bool GenicamCamera::awaits_action() {
+    const std::lock_guard lock(mutex_);
+    return !actions_.empty();
+}
+
+void GenicamCamera::take_actions(HostTime now) {
+    for (;;) {
+        HostTime due;
+        {
+            const std::lock_guard lock(mutex_);
+            if (actions_.empty() || actions_.front() > now) return;
+            due = actions_.front();
+            actions_.pop_front();
+        }
+        expose(due, nullptr);
+    }
 }
 
 bool GenicamCamera::poll(HostTime now) {
     free_run(now);
+    take_actions(now);
     if (muted() || !reboots_.exchange(false)) return false;
     restart();
     return true;
@@ -255,6 +324,17 @@ void GenicamCamera::apply_outages() {
     if (reboot != nullptr) reboots_ = true;
 }
 
+void GenicamCamera::suffer_ptp_faults(HostTime at) {
+    for (const Fault& fault : faults_) {
+        if (fault.at_exposure != exposures_) continue;
+        const auto duration = Duration{std::llround(fault.seconds * 1e9)};
+        if (fault.kind == FaultKind::lose_ptp) clock_.lose_master(at, duration);
+        if (fault.kind == FaultKind::ptp_master) clock_.become_master(at, duration);
+        if (fault.kind == FaultKind::ptp_foreign)
+            clock_.follow_another(at, Duration{std::llround(fault.delay_ms * 1e6)}, duration);
+    }
+}
+
 void GenicamCamera::report_ptp(HostTime at) {
     for (const Fault& fault : faults_) {
         if (fault.kind != FaultKind::lose_ptp) continue;
@@ -278,11 +358,12 @@ bool GenicamCamera::starts_to_expose(HostTime trigger, const TriggerPulse* pulse
         return false;
     }
     apply_outages();
+    suffer_ptp_faults(trigger);
     report_ptp(trigger);
     if (active_fault(FaultKind::restart_ids) != nullptr) block_id_ = 0;
     if (active_fault(FaultKind::repeat_id) == nullptr) next_block_id();
     if (const Fault* jump = active_fault(FaultKind::jump_clock))
-        clock_step_ns_ += std::llround(jump->seconds * 1e9);
+        clock_.jump(Duration{std::llround(jump->seconds * 1e9)});
     if (active_fault(FaultKind::change_size) != nullptr)
         registers_.resize(settings_.width, settings_.height / 2);
     if (active_fault(FaultKind::double_exposure) != nullptr)
@@ -337,6 +418,8 @@ void GenicamCamera::send(TrueExposure exposure) {
     if (active_fault(FaultKind::stop_clock) == nullptr)
         camera_time_ns_ = ticks(stamped(settings_, exposure.start, exposure.end));
     frame.camera_time_ns = camera_time_ns_;
+    if (active_fault(FaultKind::utc_stamps) != nullptr)
+        frame.camera_time_ns -= static_cast<std::uint64_t>(std::llround(ahead_of_utc_s_ * 1e9));
     frame.width = registers_.value(reg_width);
     frame.height = registers_.value(reg_height);
     if (view_.painted())

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <bit>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -19,8 +20,8 @@
 #include "camera_view.hpp"
 #include "frame_queue.hpp"
 #include "ground_truth.hpp"
+#include "ptp_follower.hpp"
 #include "scenario.hpp"
-#include "skewed_clock.hpp"
 
 namespace versavis::rig {
 
@@ -82,10 +83,21 @@ class GenicamCamera {
     /// What its clock shows.
     std::uint64_t ticks(HostTime at) const;
 
+    /// What it makes of a scheduled action.
+    enum class Action { taken, no_time, queue_full, late };
+    Action schedule(std::uint64_t ticks);
+    /// poll() should be called more often.
+    bool awaits_action();
+    static constexpr std::uint32_t action_queue_size = 2;
+
  private:
     using Interval = std::pair<HostTime, HostTime>;
     void start_acquisition();
     void free_run(HostTime now);
+    void take_actions(HostTime now);
+    void suffer_ptp_faults(HostTime at);
+    void latch_ptp();
+    void latch_clock();
     std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
     std::vector<Interval> take_trigger(const TriggerPulse& pulse);
     double exposures_to_make();
@@ -106,8 +118,9 @@ class GenicamCamera {
     CameraScenario settings_;
     std::vector<Fault> faults_;
     HostTime zero_;
+    double ahead_of_utc_s_;
     GroundTruth& truth_;
-    SkewedClock clock_;
+    PtpFollower clock_;
     CameraFamily family_;
     std::endian chunk_order_;
     CameraRegisters registers_;
@@ -123,9 +136,9 @@ class GenicamCamera {
     std::mt19937_64 random_;  ///< draws the triggers that it ignores
     HostTime busy_until_;
     HostTime free_run_next_;
+    std::deque<HostTime> actions_;  ///< scheduled
     std::function<void(const Fault&)> afflict_board_;
 
-    std::atomic<std::int64_t> clock_step_ns_{0};
     std::atomic<std::int64_t> muted_until_ns_{INT64_MIN};
     std::atomic<bool> reboots_{false};
     FrameQueue queue_;

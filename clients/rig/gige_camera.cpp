@@ -22,10 +22,11 @@ namespace {
 constexpr std::uint16_t gvcp_port = 3956;
 constexpr std::uint8_t gvcp_key = 0x42;
 constexpr std::uint8_t acknowledge_wanted = 0x01;
+constexpr std::uint8_t action_scheduled = 0x80;
 constexpr std::size_t discovery_size = 0xF8;
 constexpr std::size_t most_memory = 512;
 constexpr int poll_ms = 20;
-constexpr int answer_poll_ms = 1;  ///< while answers wait
+constexpr int busy_poll_ms = 1;  ///< while answers or actions wait
 constexpr std::uint32_t fire_bit = 1U << 31U;
 
 enum Command : std::uint16_t {
@@ -36,6 +37,7 @@ enum Command : std::uint16_t {
     read_memory = 0x0084,
     write_memory = 0x0086,
     pending_acknowledge = 0x0089,
+    action = 0x0100,
 };
 
 enum Status : std::uint16_t {
@@ -44,6 +46,9 @@ enum Status : std::uint16_t {
     invalid_parameter = 0x8002,
     invalid_address = 0x8003,
     access_denied = 0x8006,
+    no_reference_time = 0x8013,
+    overflow = 0x8015,
+    action_late = 0x8016,
 };
 
 std::uint32_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -120,7 +125,7 @@ GigeCamera::~GigeCamera() {
 void GigeCamera::serve() {
     while (!stop_) {
         pollfd readable[] = {{socket_.get(), POLLIN, 0}, {broadcast_socket_.get(), POLLIN, 0}};
-        ::poll(readable, 2, answers_.empty() ? poll_ms : answer_poll_ms);
+        ::poll(readable, 2, answers_.empty() && !camera_.awaits_action() ? poll_ms : busy_poll_ms);
         if (camera_.poll(host_now())) {
             lose_controller();
             configure_stream();
@@ -146,21 +151,49 @@ void GigeCamera::receive(int socket) {
 void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in& from) {
     if (packet[0] != gvcp_key || packet.size() < 8U + half(packet, 4)) return;
     const std::uint16_t command = half(packet, 2);
+    if (command == action) {
+        const auto status = take_action(packet);
+        if (!status) return;  // it is meant for others
+        return reply(packet, *status, {}, from);
+    }
     if (same(from, controller_)) last_contact_ = host_now();
     std::uint16_t status = success;
     const bool later = pending(command, packet.subspan(8, half(packet, 4)));
     const std::vector<std::uint8_t> body =
         later ? std::vector<std::uint8_t>{0, 0, 0xFF, 0xFF}
               : answer(command, packet.subspan(8, half(packet, 4)), from, status);
+    reply(packet, status, body, from, later);
+}
+
+void GigeCamera::reply(std::span<const std::uint8_t> packet, std::uint16_t status,
+                       const std::vector<std::uint8_t>& body, const sockaddr_in& to, bool later) {
     if ((packet[1] & acknowledge_wanted) == 0) return;
     std::vector<std::uint8_t> reply;
     put_half(reply, status);
-    put_half(reply, later ? +pending_acknowledge : command + 1U);
+    put_half(reply, later ? +pending_acknowledge : half(packet, 2) + 1U);
     put_half(reply, body.size());
     put_half(reply, half(packet, 6));
     reply.insert(reply.end(), body.begin(), body.end());
-    answers_.push_back({host_now() + answer_time_, std::move(reply), from});
+    answers_.push_back({host_now() + answer_time_, std::move(reply), to});
     send_answers();
+}
+
+/// Its status; none: its keys are not this camera's.
+std::optional<std::uint16_t> GigeCamera::take_action(std::span<const std::uint8_t> packet) {
+    const auto body = packet.subspan(8, half(packet, 4));
+    if (body.size() < 12) return invalid_parameter;
+    const bool meant = word(body, 0) == registers_.value(reg_action_device_key) &&
+                       word(body, 4) == registers_.value(reg_action_group_key) &&
+                       (word(body, 8) & registers_.value(reg_action_group_mask)) != 0 &&
+                       registers_.value(reg_control_privilege) != 0;
+    if (!meant) return std::nullopt;
+    if ((packet[1] & action_scheduled) == 0 || body.size() < 20) return not_implemented;
+    switch (camera_.schedule(std::uint64_t{word(body, 12)} << 32U | word(body, 16))) {
+        case GenicamCamera::Action::no_time: return no_reference_time;
+        case GenicamCamera::Action::queue_full: return overflow;
+        case GenicamCamera::Action::late: return action_late;
+        default: return success;
+    }
 }
 
 void GigeCamera::send_answers() {

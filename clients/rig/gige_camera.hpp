@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <span>
 #include <thread>
 #include <vector>
@@ -44,6 +45,9 @@ class GigeCamera final : private CameraTransport {
     void receive(int socket);
     void send_answers();
     void handle(std::span<const std::uint8_t> packet, const sockaddr_in& from);
+    void reply(std::span<const std::uint8_t> packet, std::uint16_t status,
+               const std::vector<std::uint8_t>& body, const sockaddr_in& to, bool later = false);
+    std::optional<std::uint16_t> take_action(std::span<const std::uint8_t> packet);
     std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body,
                                      const sockaddr_in& from, std::uint16_t& status);
     std::uint16_t write_register(std::uint32_t address, std::uint32_t value,

@@ -9,6 +9,7 @@
 #include "bytes.hpp"
 #include "camera_transport.hpp"
 #include "camera_xml.hpp"
+#include "genicam_camera.hpp"
 #include "gige_hostile.hpp"
 
 namespace versavis::rig {
@@ -20,6 +21,9 @@ constexpr std::uint32_t default_heartbeat_ms = 3000;
 constexpr std::uint32_t tick_frequency = 1'000'000'000;
 constexpr std::uint32_t capability_write_memory = 1U << 1U;
 constexpr std::uint32_t capability_resend = 1U << 2U;
+constexpr std::uint32_t capability_action = 1U << 6U;
+constexpr std::uint32_t capability_scheduled_action = 1U << 17U;
+constexpr std::uint32_t capability_ptp = 1U << 19U;
 
 void add_events(XmlWriter& xml) {
     const std::pair<const char*, CameraEventId> events[] = {
@@ -38,6 +42,32 @@ void add_events(XmlWriter& xml) {
                     "EventSelector");
 }
 
+void add_ptp_and_actions(XmlWriter& xml) {
+    xml.boolean("PtpEnable", reg_ptp_enable);
+    xml.boolean("PtpSlaveOnly", reg_ptp_slave_only);
+    xml.command("PtpDataSetLatch", reg_ptp_latch);
+    xml.enumeration("PtpStatus", reg_ptp_status,
+                    {{"Initializing", 0},
+                     {"Faulty", 1},
+                     {"Disabled", static_cast<std::uint32_t>(PtpPort::disabled)},
+                     {"Listening", static_cast<std::uint32_t>(PtpPort::listening)},
+                     {"PreMaster", 4},
+                     {"Master", static_cast<std::uint32_t>(PtpPort::master)},
+                     {"Passive", 6},
+                     {"Uncalibrated", static_cast<std::uint32_t>(PtpPort::uncalibrated)},
+                     {"Slave", static_cast<std::uint32_t>(PtpPort::slave)}});
+    xml.integer("PtpOffsetFromMaster", reg_ptp_offset, "", false);
+    xml.integer("PtpGrandmasterClockID", reg_ptp_grandmaster, "", false);
+    xml.command("TimestampLatch", reg_clock_latch);
+    xml.wide_integer("TimestampLatchValue", reg_clock_latched);
+    const std::string any = "<Min>0</Min><Max>4294967295</Max>";
+    xml.integer("ActionDeviceKey", reg_action_device_key, any);
+    xml.integer("ActionSelector", reg_action_selector, "<Min>0</Min><Max>0</Max>");
+    xml.integer("ActionGroupKey", reg_action_group_key, any);
+    xml.integer("ActionGroupMask", reg_action_group_mask, any);
+    xml.integer("ActionQueueSize", reg_action_queue_size, "", false);
+}
+
 }  // namespace
 
 std::string gige_xml(std::uint32_t width, std::uint32_t height, const CameraFamily& family) {
@@ -53,6 +83,7 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height, const CameraFami
     xml.integer("GevSCPD", reg_stream_packet_delay, "<Min>0</Min><Max>4294967295</Max>");
     xml.integer("GevTimestampTickFrequency", reg_tick_low, "", false);
     if (family.nodes.empty()) add_events(xml);
+    if (family.nodes.empty()) add_ptp_and_actions(xml);
     return xml.document("GEV", family);
 }
 
@@ -84,7 +115,9 @@ TransportMemory gige_memory(const CameraScenario& settings, const CameraFamily& 
     set(reg_interface_count, 1);
     set(reg_message_count, settings.events ? 1 : 0);
     set(reg_stream_count, 1);
-    set(reg_capabilities, capability_write_memory | capability_resend);
+    set(reg_capabilities, capability_write_memory | capability_resend | capability_action |
+                              capability_scheduled_action | capability_ptp);
+    set(reg_action_queue_size, GenicamCamera::action_queue_size);
     set(reg_heartbeat_ms, default_heartbeat_ms);
     set(reg_tick_low, tick_frequency);
     set(reg_stream_packet_size, 1500);

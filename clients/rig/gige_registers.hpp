@@ -28,9 +28,12 @@ enum GigeRegister : std::uint32_t {
     reg_interface_count = 0x0600,
     reg_message_count = 0x0900,
     reg_stream_count = 0x0904,
+    reg_action_device_key = 0x090C,
     reg_capabilities = 0x0934,
     reg_heartbeat_ms = 0x0938,
     reg_tick_low = 0x0940,
+    reg_clock_latched = 0x0948,  ///< 64 bits
+    reg_action_queue_size = 0x0970,
     reg_control_privilege = 0x0A00,
     reg_message_port = 0x0B00,
     reg_message_address = 0x0B10,
@@ -39,6 +42,8 @@ enum GigeRegister : std::uint32_t {
     reg_stream_packet_delay = 0x0D08,
     reg_stream_address = 0x0D18,
     reg_stream_source_port = 0x0D1C,
+    reg_action_group_key = 0x9800,
+    reg_action_group_mask = 0x9804,
 };
 
 TransportMemory gige_memory(const CameraScenario& settings, const CameraFamily& family);

@@ -108,11 +108,13 @@ class Recorder {
         const std::uint64_t serial = FrameMark::serial_in(item.payload.data(), item.payload.size());
         if ((item.data.flags & flag_suspect) != 0)
             return;  // the service says itself that it may be wrong
+        // The camera does not know how its scheduled actions are numbered.
+        const bool by_ptp = item.data.stamp_kind() == StampKind::camera_ptp;
         if (!item.valid())
             ++recording.missed;
         else
-            recording.items.push_back(
-                {serial, item.data.trigger, to_host_ns(item.time.output()), item.data.sigma_ns});
+            recording.items.push_back({serial, by_ptp ? 0 : item.data.trigger,
+                                       to_host_ns(item.time.output()), item.data.sigma_ns});
     }
 
     void take(const ImuSample& item) {

@@ -95,6 +95,10 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("led_level", camera.led_level, 0, 1000);
     reader.read("temperature_c", camera.temperature_c, -40, 150);
     reader.read("auto_gain", camera.auto_gain);
+    reader.read("ptp_lock_s", camera.ptp_lock_s, 0, 1e3);
+    reader.read("ptp_error_ns", camera.ptp_error_ns, -1e9, 1e9);
+    reader.read("ptp_swing_ns", camera.ptp_swing_ns, 0, 1e9);
+    reader.read("action_jitter_us", camera.action_jitter_us, 0, 1e5);
     reader.choose<Hostility>("hostile", camera.hostility,
                              {{"none", Hostility::none},
                               {"value_loop", Hostility::value_loop},
@@ -135,6 +139,9 @@ Fault read_fault(TableReader& reader) {
                               {"change_size", FaultKind::change_size},
                               {"stop_clock", FaultKind::stop_clock},
                               {"lose_ptp", FaultKind::lose_ptp},
+                              {"ptp_master", FaultKind::ptp_master},
+                              {"ptp_foreign", FaultKind::ptp_foreign},
+                              {"utc_stamps", FaultKind::utc_stamps},
                               {"double_frame", FaultKind::double_frame},
                               {"double_exposure", FaultKind::double_exposure},
                               {"ignore_trigger", FaultKind::ignore_trigger},
@@ -175,6 +182,12 @@ Expected<Scenario> load_scenario(const std::string& path) {
         reader.read("gnss", scenario.board.gnss);
         reader.read("link_ms", scenario.board.link_ms, 0, 1000);
         read_clock(reader, scenario.board.clock);
+        reader.finish();
+    }
+    if (const toml::table* table = top.table("ptp")) {
+        TableReader reader(file, *table);
+        reader.read("ahead_of_utc_s", scenario.ptp.ahead_of_utc_s, -1e9, 1e9);
+        reader.read("skew_ppm", scenario.ptp.skew_ppm, -1e3, 1e3);
         reader.finish();
     }
     if (const toml::table* table = top.table("motion")) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gige_hostile.hpp"
+#include "ptp_follower.hpp"
 #include "skewed_clock.hpp"
 #include "versavis/error.hpp"
 
@@ -87,26 +88,34 @@ struct CameraScenario {
     std::vector<double> leds{};  ///< centres of the outermost LEDs, x and y each; none: not in view
     double led_level = 160;      ///< brightness of an LED that is lit during the whole exposure
     double temperature_c = 45;
-    bool auto_gain = false;  ///< frame n is taken with n mod 10 dB
+    bool auto_gain = false;       ///< frame n is taken with n mod 10 dB
+    double ptp_lock_s = 0.5;      ///< until its clock follows PTP, once it is switched on
+    double ptp_error_ns = 0;      ///< that it is then off its master ...
+    double ptp_swing_ns = 100;    ///< ... and by how much that swings
+    double action_jitter_us = 0;  ///< of the instant at which it takes a scheduled action
     Hostility hostility = Hostility::none;
     std::string model{};  ///< whose description it offers; empty: the rig's own
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 
 enum class FaultKind {
-    drop_frame,    ///< the exposure happens, no packet leaves
-    drop_leader,   ///< the frame's first packet never leaves, not even when it is asked for again
-                   ///< ...
-    drop_last,     ///< ... nor its last ones
-    half_frame,    ///< the frame ends in the middle, as if it were whole
-    swap_frames,   ///< the frame leaves after the next one
-    repeat_id,     ///< the frame has the number of the one before
-    restart_ids,   ///< numbers start again
-    jump_clock,    ///< the camera's clock steps by `seconds`, from this frame on
-    change_size,   ///< from this frame on they have half the height
-    stop_clock,    ///< the camera's clock stands still, since the frame before
-    lose_ptp,      ///< the camera reports that its clock lost PTP, and then that it has it again
-    double_frame,  ///< the camera exposes once more, right after, for the same trigger
+    drop_frame,   ///< the exposure happens, no packet leaves
+    drop_leader,  ///< the frame's first packet never leaves, not even when it is asked for again
+                  ///< ...
+    drop_last,    ///< ... nor its last ones
+    half_frame,   ///< the frame ends in the middle, as if it were whole
+    swap_frames,  ///< the frame leaves after the next one
+    repeat_id,    ///< the frame has the number of the one before
+    restart_ids,  ///< numbers start again
+    jump_clock,   ///< the camera's clock steps by `seconds`, from this frame on
+    change_size,  ///< from this frame on they have half the height
+    stop_clock,   ///< the camera's clock stands still, since the frame before
+    lose_ptp,     ///< the camera reports that its clock lost PTP, and then that it has it again; if
+                  ///< it follows PTP, it hears no master for `seconds`
+    ptp_master,   ///< the camera says for `seconds` that it is a PTP master, and drifts
+    ptp_foreign,  ///< for `seconds` it follows another master, whose time is `delay_ms` ahead
+    utc_stamps,   ///< the frame's stamp lacks what PTP's time is ahead of UTC
+    double_frame,     ///< the camera exposes once more, right after, for the same trigger
     double_exposure,  ///< the camera doubles its ExposureTime by itself
     ignore_trigger,   ///< the camera does not expose
     camera_mute,      ///< no answer and no packet for `seconds`
@@ -141,6 +150,7 @@ struct Scenario {
     std::uint64_t seed = 1;
     BoardScenario board;
     std::string imu = "imu0";
+    PtpScenario ptp;
     MotionScenario motion;
     LedScenario leds;
     std::vector<CameraScenario> cameras;

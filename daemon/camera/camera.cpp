@@ -11,11 +11,13 @@
 #include <thread>
 
 #include "base/thread_watch.hpp"
+#include "camera/action_trigger.hpp"
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
 #include "camera/image_receiver.hpp"
+#include "camera/ptp_reader.hpp"
 #include "posix/thread.hpp"
 #include "settings/receive_mode.hpp"
 
@@ -60,6 +62,14 @@ constexpr Duration renumbering_memory = seconds(30);
 
 /// Between looks at a streaming camera.
 constexpr Duration poll_interval = milliseconds(20);
+
+/// Between questions for the state of a camera's PTP port. Half: twice the traffic. Twice: a camera
+/// that lost its master is triggered for a second more; its frames are withheld all the same if its
+/// clock departs.
+constexpr Duration ptp_status_interval = milliseconds(500);
+
+/// Between readings of a clock that no frame waits for.
+constexpr Duration clock_reading_interval = milliseconds(100);
 
 /// Between readings of what changes slowly.
 constexpr Duration housekeeping_interval = seconds(3);
@@ -210,7 +220,8 @@ bool Camera::asked_to_end() const { return stop_ || (change_ && !streaming_); }
 /// Waits, unless the session is to end. False: it is.
 bool Camera::pause(Duration duration) {
     std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, std::chrono::nanoseconds(duration.ns), [this] { return asked_to_end(); });
+    wake_.wait_for(lock, std::chrono::nanoseconds(duration.ns),
+                   [this] { return asked_to_end() || clock_reading_wanted_.exchange(false); });
     return !asked_to_end();
 }
 
@@ -453,6 +464,12 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
     }
+    std::optional<PtpReader> ptp;
+    if (pipeline_.by_ptp()) {
+        auto reader = PtpReader::create(nodes, configuration_.name);
+        if (!reader) return problem(CameraState::misconfigured, reader.error());
+        ptp.emplace(std::move(*reader));
+    }
     auto frames = receive(camera, nodes, setup);
     if (!frames) return failed(frames.error());
     if (*frames == nullptr) return {};
@@ -471,7 +488,11 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     streaming_ = true;
     settle_change("");
     hooks_.streaming();
-    auto ended = watch(camera, nodes, **frames, control_lost);
+    auto ended = [&] {
+        const auto trigger =
+            ptp ? ActionTrigger::create(device_->interface, device_->address, pipeline_) : nullptr;
+        return watch(camera, nodes, **frames, ptp ? &*ptp : nullptr, control_lost);
+    }();
     lose();
     if (!ended) {
         set_state(ended.error().state, ended.error().error.message());
@@ -551,12 +572,16 @@ void Camera::plan_bandwidth(ArvCamera* camera, AravisNodeMap& nodes, std::uint64
 
 bool Camera::silent(HostTime began) const {
     const Duration since = host_now() - std::max(pipeline_.report().last_sign, began);
-    if (!pipeline_.triggered()) return since > time_of_free_silence;
+    if (!has_triggers()) return since > time_of_free_silence;
     return pipeline_.unanswered_triggers() > triggers_of_silence && since > time_of_silence;
 }
 
 CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& frames,
-                             const std::atomic<bool>& control_lost) {
+                             PtpReader* ptp, const std::atomic<bool>& control_lost) {
+    pipeline_.when_clock_reading_wanted([this] {
+        clock_reading_wanted_ = true;
+        wake_.notify_all();
+    });
     Health health;
     health.received = pipeline_.report().received;
     if (device_) health.client.emplace(device_->interface, device_->address);
@@ -567,6 +592,7 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSourc
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});
         if (!change_live(nodes)) return {};
+        if (ptp != nullptr) follow_ptp(*ptp);
         if (auto good = examine(frames, health); !good) return good;
         if (exposure_) control_exposure(nodes);
         if (host_now() >= next_reading_ && pipeline_.wants_exposure_readings())
@@ -576,6 +602,21 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSourc
         do_housekeeping(camera, nodes);
     }
     return {};
+}
+
+bool Camera::has_triggers() const { return pipeline_.triggered() || pipeline_.by_ptp(); }
+
+/// Each frame waits for a reading; without frames the clock is read all the same, so that triggers
+/// can begin.
+void Camera::follow_ptp(PtpReader& ptp) {
+    const HostTime now = host_now();
+    if (now >= next_ptp_status_) {
+        next_ptp_status_ = now + ptp_status_interval;
+        pipeline_.note_ptp(ptp.status().value_or(PtpStatus{}));
+    }
+    if (now < next_clock_reading_ && !pipeline_.wants_clock_reading()) return;
+    next_clock_reading_ = now + clock_reading_interval;
+    if (const auto reading = ptp.clock()) pipeline_.read_clock(*reading);
 }
 
 /// Whether what comes, or does not come, means that the camera must be opened anew.
@@ -606,8 +647,7 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
         if (health.taken > few_frames) deaf_streams_ = 0;
     }
     const bool silent = this->silent(health.began);
-    const bool expected =
-        !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
+    const bool expected = !has_triggers() || pipeline_.unanswered_triggers() > triggers_of_silence;
     const bool missed = expected && host_now() - health.taken_at > time_of_deafness;
     deaf_ = frames.packets() > health.packets && missed;
     if (frames.packets() > health.packets && (silent || (health.taken > 0 && missed))) {
@@ -625,9 +665,10 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
     return problem(
         CameraState::silent,
         {configuration_.name,
-         pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
-         "check the trigger cable, TriggerSource and the network; the camera is being "
-         "reopened"});
+         has_triggers() ? "triggers are sent but no frames come" : "no frames come",
+         pipeline_.by_ptp() ? "check TriggerSource and the network; the camera is being reopened"
+                            : "check the trigger cable, TriggerSource and the network; the camera "
+                              "is being reopened"});
 }
 
 /// Whether a camera that leaves triggers unanswered has forgotten that it is controlled.
@@ -636,7 +677,7 @@ bool Camera::restarted(Health& health) const {
     const Duration silence = now - std::max(pipeline_.report().last_frame, health.began);
     if (!health.client || silence < first_doubt || now - health.doubted < doubt_interval)
         return false;
-    if (pipeline_.triggered() && pipeline_.unanswered_triggers() < triggers_of_doubt) return false;
+    if (has_triggers() && pipeline_.unanswered_triggers() < triggers_of_doubt) return false;
     health.doubted = now;
     const auto privilege = health.client->read_register(gvcp_control_privilege, doubt_patience);
     return privilege && (*privilege & gvcp_controlled) == 0;
@@ -685,7 +726,7 @@ void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
                            sensor.temperature_c);
     else if (without_clock_)
         hint = "its clock stood still: it is paired without it; power the camera off and on";
-    else if (pipeline_.report().ptp_lost)
+    else if (pipeline_.report().ptp_lost && !pipeline_.by_ptp())
         hint =
             "its clock lost PTP, and its frames are paired as before: check the PTP master and the "
             "network";

@@ -36,6 +36,7 @@ namespace versavis::daemon {
 struct CameraSetup;
 class AravisNodeMap;
 class FrameSource;
+class PtpReader;
 
 struct CameraReport {
     CameraState state = CameraState::absent;
@@ -139,7 +140,8 @@ class Camera {
     Expected<std::unique_ptr<FrameSource>> receive(ArvCamera* camera, const AravisNodeMap& nodes,
                                                    const CameraSetup& setup);
     CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& frames,
-                         const std::atomic<bool>& control_lost);
+                         PtpReader* ptp, const std::atomic<bool>& control_lost);
+    void follow_ptp(PtpReader& ptp);
     CameraResult<> examine(FrameSource& frames, Health& health);
     void note_held();
     void explain(CameraProblem& ended);
@@ -154,6 +156,7 @@ class Camera {
     SensorState read_sensor(const AravisNodeMap& nodes);
     bool silent(HostTime began) const;
     bool mute() const;  ///< no frame comes
+    bool has_triggers() const;
     void describe(const CameraSetup& setup);
     void lose();
     void set_state(CameraState state, const std::string& hint);
@@ -186,6 +189,8 @@ class Camera {
         watched_;                        ///< features, and the values that they were set up with
     std::vector<std::string> refusals_;  ///< that were logged
     HostTime next_reading_;              ///< of the exposure
+    HostTime next_ptp_status_;
+    HostTime next_clock_reading_;
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
     Retry retry_;
@@ -193,6 +198,7 @@ class Camera {
     HostTime held_since_;                  ///< somebody else has control since; 0: nobody
     static constexpr std::int64_t never_ns = INT64_MIN / 2;
     RepeatLimit log_limit_;  ///< of states
+    std::atomic<bool> clock_reading_wanted_{false};
     std::atomic<bool> deaf_{false};
     std::atomic<unsigned> deaf_streams_{0};                     ///< in a row
     std::atomic<std::int64_t> renumbered_ns_{never_ns};         ///< its frames were numbered anew

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/log.hpp"
+#include "camera/action_trigger.hpp"
 #include "camera/u3v_client.hpp"
 
 namespace versavis::daemon {
@@ -83,14 +84,16 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
     if (!configuration.keep_settings) groups.emplace_back("default_settings");
     groups.emplace_back("known_state");
     if (configuration.chunks.value_or(false)) groups.emplace_back("chunks");
-    if (configuration.ptp) groups.emplace_back("ptp");
+    const bool by_ptp = configuration.trigger == TriggerSource::ptp;
+    if (configuration.ptp || by_ptp) groups.emplace_back("ptp");
     if (configuration.auto_exposure.enabled) groups.emplace_back("fixed_exposure");
     if (configuration.trigger == TriggerSource::free_run) {
         groups.emplace_back("free_run");
         return groups;
     }
     if (!configuration.auto_exposure.enabled) groups.emplace_back("exposure_limit");
-    groups.emplace_back("trigger");
+    groups.emplace_back(by_ptp ? "action" : "trigger");
+    if (by_ptp) return groups;
     if (configuration.exposure_by_pulse) groups.emplace_back("pulse_width");
     if (configuration.strobe != Strobe::none) groups.emplace_back("strobe");
     return groups;
@@ -99,7 +102,7 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
 /// Error: what is asked for, these cameras do not have.
 Expected<> check_groups(const CameraPreset& preset, const CameraConfiguration& configuration) {
     for (const std::string& group : wanted_groups(configuration))
-        if ((group == "chunks" || group == "ptp" || group == "pulse_width") &&
+        if ((group == "chunks" || group == "ptp" || group == "action" || group == "pulse_width") &&
             preset.groups.at(group).empty())
             return failure(fmt::format("preset {}", preset.name),
                            fmt::format("these cameras have no '{}'", group),
@@ -120,6 +123,9 @@ PresetVariables variables_of(const CameraPreset& preset, const CameraConfigurati
             {"chunk_gain", preset.chunk_gain_selector},
             {"line_inverter", {preset.line_inverter ? "true" : "false"}},
             {"max_exposure_us", {fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))}},
+            {"device_key", {std::to_string(action_device_key)}},
+            {"group_key", {std::to_string(action_group_key)}},
+            {"group_mask", {std::to_string(action_group_mask)}},
             {"edge", {configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}}};
 }
 
@@ -171,7 +177,8 @@ std::vector<std::pair<std::string, std::string>> watched(const AravisNodeMap& no
         if (!value.empty()) features.emplace_back(feature, value);
     };
     for (const StepResult& step : steps)
-        if ((step.group == "trigger" || step.group == "strobe") && step.outcome == StepOutcome::set)
+        if ((step.group == "trigger" || step.group == "action" || step.group == "strobe") &&
+            step.outcome == StepOutcome::set)
             add(step.feature);
     add("ExposureAuto");
     if (!changes_itself(nodes, "ExposureAuto")) add(exposure_feature);
@@ -189,7 +196,7 @@ bool has_clock(ArvDevice* device) {
 /// By itself, or because the service sets it while the camera streams.
 bool exposure_changes(const AravisNodeMap& nodes, const CameraSetup& setup,
                       const CameraConfiguration& configuration) {
-    return configuration.trigger == TriggerSource::board &&
+    return configuration.trigger != TriggerSource::free_run &&
            (configuration.auto_exposure.enabled ||
             fixed_exposure(nodes, setup.exposure_feature).ns == 0);
 }

@@ -141,16 +141,20 @@ void PresetRun::read_back() {
 
 Expected<> PresetRun::verdict() const {
     std::vector<std::string> problems;
+    bool by_ptp = false;
     for (const StepResult& result : results_)
-        if (result.needed && result.outcome != StepOutcome::set)
+        if (result.needed && result.outcome != StepOutcome::set) {
+            by_ptp = by_ptp || result.group == "ptp" || result.group == "action";
             problems.push_back(result.outcome == StepOutcome::differs
                                    ? result.node() + " " + result.reason
                                    : result.reason);
+        }
     if (problems.empty()) return {};
     return failure(fmt::format("preset {}", preset_.name),
                    fmt::format("does not fit this camera: {}", fmt::join(problems, "; ")),
-                   "set 'trigger_line' and 'strobe_line', another 'preset', or the features by "
-                   "name");
+                   by_ptp ? "trigger it by the board, update its firmware, or set 'preset'"
+                          : "set 'trigger_line' and 'strobe_line', another 'preset', or the "
+                            "features by name");
 }
 
 }  // namespace versavis::daemon

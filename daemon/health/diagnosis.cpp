@@ -8,6 +8,7 @@
 
 #include "board/board_event.hpp"
 #include "engine/board/firmware_file.hpp"
+#include "ptp_diagnosis.hpp"
 #include "status.hpp"
 
 namespace versavis::daemon {
@@ -405,6 +406,13 @@ std::string opening_hint(const CameraView& camera) {
         lasts.ns / seconds(1).ns);
 }
 
+template <Fault fault>
+bool by_ptp(const CameraView& camera) {
+    return diagnose_ptp(camera.it, camera.all).fault == fault;
+}
+
+std::string ptp_hint(const CameraView& camera) { return diagnose_ptp(camera.it, camera.all).hint; }
+
 struct Rule {
     Fault fault;
     bool (*applies)(const CameraView&);
@@ -467,6 +475,11 @@ constexpr Rule camera_rules[] = {
          return std::string("frames are withheld: the board's clock is not known yet");
      }},
     {Fault::starting, [](const CameraView& c) { return !c.streaming(); }, opening_hint},
+    {Fault::ptp_master, by_ptp<Fault::ptp_master>, ptp_hint},
+    {Fault::ptp_lost, by_ptp<Fault::ptp_lost>, ptp_hint},
+    {Fault::ptp_other_time, by_ptp<Fault::ptp_other_time>, ptp_hint},
+    {Fault::ptp_refused, by_ptp<Fault::ptp_refused>, ptp_hint},
+    {Fault::ptp_stamps, by_ptp<Fault::ptp_stamps>, ptp_hint},
     {Fault::link_full,
      [](const CameraView& c) { return lost_packets(c) && !c.it.camera.bandwidth.fits(); },
      own_hint},
@@ -716,6 +729,11 @@ const char* to_string(Fault fault) {
         case Fault::wrong_exposure: return "wrong_exposure";
         case Fault::unproved: return "unproved";
         case Fault::too_slow: return "too_slow";
+        case Fault::ptp_master: return "ptp_master";
+        case Fault::ptp_lost: return "ptp_lost";
+        case Fault::ptp_other_time: return "ptp_other_time";
+        case Fault::ptp_refused: return "ptp_refused";
+        case Fault::ptp_stamps: return "ptp_stamps";
         case Fault::imu_missing: return "imu_missing";
         case Fault::imu_wrong: return "imu_wrong";
         case Fault::imu_silent: return "imu_silent";

@@ -67,6 +67,12 @@ enum class Fault {
     wrong_exposure,
     unproved,
     too_slow,
+    // Of a camera that is triggered by PTP time.
+    ptp_master,
+    ptp_lost,
+    ptp_other_time,
+    ptp_refused,
+    ptp_stamps,
     // Of an IMU.
     imu_missing,
     imu_wrong,

@@ -42,6 +42,7 @@ PipelineReport difference(PipelineReport now, const PipelineReport& before) {
     now.records_doubted -= before.records_doubted;
     now.triggers_missed -= before.triggers_missed;
     now.suspect -= before.suspect;
+    now.actions_refused -= before.actions_refused;
     now.answers.ignored -= before.answers.ignored;
     now.answers.ids_repeated -= before.answers.ids_repeated;
     now.answers.ids_restarted -= before.answers.ids_restarted;

@@ -151,16 +151,60 @@ json setup_json(const std::vector<StepResult>& steps) {
     return setup;
 }
 
-json camera_json(const CameraStatus& status) {
+const char* to_string(TriggerSource trigger) {
+    switch (trigger) {
+        case TriggerSource::board: return "board";
+        case TriggerSource::free_run: return "free";
+        case TriggerSource::ptp: return "ptp";
+    }
+    return "unknown";
+}
+
+json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
+
+/// Null: it is not triggered by PTP time.
+json ptp_clock_json(const CameraStatus& status, const std::optional<PtpReport>& ptp) {
+    if (!ptp || status.configuration.trigger != TriggerSource::ptp) return {};
+    const auto found = std::find_if(ptp->clocks.begin(), ptp->clocks.end(),
+                                    [&](const auto& clock) { return clock.name == status.name; });
+    if (found == ptp->clocks.end()) return {};
+    const PtpStatus& port = found->status;
+    const bool told = found->agreement != clock::Agreement::unknown;
+    return {{"port", text_or_null(port.state)},
+            {"follows", port.follows()},
+            {"offset_ns", port.offset ? json(port.offset->ns) : json()},
+            {"grandmaster", text_or_null(port.grandmaster)},
+            {"agrees", told ? json(found->agreement == clock::Agreement::agrees) : json()},
+            {"readings", found->readings},
+            {"readings_differing", found->differing},
+            {"reading_width_ns", found->width.ns},
+            {"start_delay_ns", status.pipeline.start_delay.ns},
+            {"actions_refused", status.pipeline.actions_refused}};
+}
+
+/// Null: no camera is triggered by PTP time.
+json ptp_json(const std::optional<PtpReport>& ptp) {
+    if (!ptp) return {};
+    const bool known = ptp->minus_utc.has_value();
+    return {{"state", clock::to_string(ptp->state)},
+            {"sigma_ns", known ? json(ptp->sigma.ns) : json()},
+            {"bound_ns", known ? json(ptp->bound.ns) : json()},
+            {"steps", ptp->steps},
+            {"minus_utc_ns", known ? json(ptp->minus_utc->ns) : json()},
+            {"master", text_or_null(ptp->master)}};
+}
+
+json camera_json(const CameraStatus& status, const std::optional<PtpReport>& ptp) {
     const CameraReport& camera = status.camera;
     const PipelineReport& pipeline = status.pipeline;
-    const bool triggered = status.triggered();
+    const bool free = status.configuration.trigger == TriggerSource::free_run;
     return {{"name", status.name},
             {"state", to_string(camera.state)},
             {"configured_hz", status.configuration.rate_hz},
             {"delivered_hz", status.delivery.rate_hz},
-            {"trigger", triggered ? "board" : "free"},
-            {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
+            {"trigger", to_string(status.configuration.trigger)},
+            {"pairing", free ? "none" : pairing::to_string(pipeline.pairing)},
+            {"ptp", ptp_clock_json(status, ptp)},
             {"stamp_instant", pairing::to_string(pipeline.stamp_instant)},
             {"vendor", camera.vendor},
             {"preset", camera.preset},
@@ -251,7 +295,7 @@ Summary summary(const Status& status) {
 std::string to_json(const Status& status) {
     json cameras = json::array();
     for (const CameraStatus& camera : status.cameras)
-        cameras.push_back(with_diagnosis(camera_json(camera), camera.diagnosis));
+        cameras.push_back(with_diagnosis(camera_json(camera, status.ptp), camera.diagnosis));
     json imus = json::array();
     for (const ImuStatus& imu : status.imus)
         imus.push_back(
@@ -310,6 +354,7 @@ std::string to_json(const Status& status) {
         {"clock", with_diagnosis(clock_json(status.clock, status.grid), status.clock_diagnosis)},
         {"cameras", cameras},
         {"imus", imus},
+        {"ptp", ptp_json(status.ptp)},
         {"time_outputs", time_outputs},
         {"nmea", nmea},
         {"streams", streams}};

@@ -67,6 +67,7 @@ struct Status {
     std::vector<ImuStatus> imus;
     std::vector<TimeOutputStatus> time_outputs;
     std::optional<NmeaReport> nmea;
+    std::optional<PtpReport> ptp;
     std::vector<StreamStatus> streams;
 };
 

@@ -58,7 +58,7 @@ clock::Stamp moved(clock::Stamp stamp, Duration by) {
 }  // namespace
 
 CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
-                               clock::Translator& translator, EventJournal& events)
+                               clock::Translator& translator, EventJournal& events, PtpClocks* ptp)
     : name_(configuration.name),
       triggered_(configuration.trigger == TriggerSource::board),
       output_(configuration.output),
@@ -66,6 +66,8 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       translator_(translator),
       events_(events),
       stream_(translator.add_stream(clock::Witness::grid)),
+      clocks_(configuration.trigger == TriggerSource::ptp ? ptp : nullptr),
+      clock_(clocks_ != nullptr ? clocks_->add(configuration.name) : 0),
       configuration_(configuration),
       frames_(configuration),
       evidence_(translator),
@@ -76,6 +78,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       answers_(period_of(configuration)),
       chunk_exposures_(configuration.slots),
       triggers_(configuration),
+      by_ptp_(configuration, limits_of(configuration).frames_held),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
 
@@ -91,6 +94,7 @@ void CameraPipeline::reconfigure(const CameraConfiguration& configuration) {
     check_.set_line_delays(lines);
     answers_ = AnswerWatch(period_of(configuration));
     triggers_.expect(configuration);
+    by_ptp_ = PtpFrames(configuration, limits_of(configuration).frames_held);
     const pairing::Limits before = std::exchange(limits_, limits_of(configuration));
     limits_.camera_clock = before.camera_clock && configuration.camera_clock;
     limits_.stamped = before.stamped;
@@ -161,6 +165,8 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     limits_.stamped = stamp_instant;
     answers_.restart();
+    by_ptp_.restart(stamp_instant);
+    settle_ptp();
     pairing_.set_limits(limits_);
     feed(limits_);
     report_.last_proof = host_now();
@@ -197,6 +203,7 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     answers_.arrived(arrival);
     if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
     pairing::Arrival whole = completed(arrival);
+    if (by_ptp()) return add_by_ptp(whole);
     if (triggered()) {
         chunk_exposures_[arrival.slot] = arrival.exposure;
         whole.exposure = check_.for_pairing(arrival.exposure);
@@ -363,6 +370,91 @@ void CameraPipeline::note_ptp(bool lost) {
         log_later(LogLevel::info, "the camera reports that its clock follows PTP again");
 }
 
+CameraPipeline::PtpTurn CameraPipeline::next_ptp_trigger(HostTime now) {
+    constexpr Duration idle = milliseconds(20);
+    const auto ptp = clocks_->ready(clock_) ? clocks_->at(now) : std::nullopt;
+    if (!ptp) return {std::nullopt, idle};
+    const std::lock_guard lock(mutex_);
+    const PtpTrigger trigger = by_ptp_.next(*ptp);
+    const Duration early = trigger.at - *ptp - by_ptp_.lead();
+    if (early.ns > 0) return {std::nullopt, std::min(early, idle)};
+    by_ptp_.sent(trigger, now + (trigger.at - *ptp));
+    ++report_.triggers;
+    triggers_.recorded(trigger.number, now);
+    return {trigger, {}};
+}
+
+void CameraPipeline::acknowledge(std::uint64_t trigger, std::uint16_t status) {
+    const std::lock_guard lock(mutex_);
+    if (status == 0) return by_ptp_.acknowledged(trigger);
+    ++report_.actions_refused;
+    report_.refusal = status;
+}
+
+void CameraPipeline::note_ptp(const PtpStatus& status) {
+    clocks_->note(clock_, status);
+    const std::lock_guard lock(mutex_);
+    ptp_status_ = status;
+    const std::string before = std::exchange(port_logged_, status.state);
+    if (before != status.state && !status.state.empty())
+        log_later(before == "Slave" ? LogLevel::warning : LogLevel::info,
+                  fmt::format("its PTP port is {}", status.state));
+    if (status.follows()) return;
+    by_ptp_.lose_clock();
+    settle_ptp();
+}
+
+void CameraPipeline::read_clock(const clock::ClockReading& reading) {
+    const clock::Agreement agreement = clocks_->read(clock_, reading);
+    const std::lock_guard lock(mutex_);
+    by_ptp_.read_clock(reading, agreement);
+    settle_ptp();
+}
+
+bool CameraPipeline::wants_clock_reading() {
+    const std::lock_guard lock(mutex_);
+    return by_ptp_.waiting();
+}
+
+void CameraPipeline::add_by_ptp(const pairing::Arrival& arrival) {
+    const Duration event = event_lengths_.length(arrival.block_id);
+    by_ptp_.add(arrival, event.ns != 0 ? event : arrival.exposure,
+                clocks_->to_host(arrival.camera_time));
+    settle_ptp();
+    if (by_ptp_.waiting() && reading_wanted_) reading_wanted_();
+}
+
+void CameraPipeline::when_clock_reading_wanted(std::function<void()> told) {
+    const std::lock_guard lock(mutex_);
+    reading_wanted_ = std::move(told);
+}
+
+void CameraPipeline::settle_ptp() {
+    for (const PtpVerdict& verdict : by_ptp_.take_verdicts())
+        if (verdict.exposure)
+            publish_by_ptp(verdict.arrival, *verdict.exposure);
+        else
+            frame_unpaired(verdict.arrival, verdict.reason, nullptr);
+    for (const PtpTrigger& trigger : by_ptp_.take_missed()) {
+        ++report_.triggers_without_frame;
+        journal(EventKind::trigger_without_frame, EventReason::frame_missing,
+                static_cast<std::int64_t>(trigger.number));
+    }
+}
+
+void CameraPipeline::publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure) {
+    const auto middle = clocks_->translate(exposure.middle());
+    if (!middle) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
+    if (!frames_.publish_by_ptp(arrival, exposure, *middle,
+                                ptp_status_.offset.value_or(Duration{}))) {
+        if (frames_.stuck()) translator_.begin_epoch();
+        return frame_unpaired(arrival, EventReason::went_back, nullptr);
+    }
+    report_.last_proof = arrival.arrived;
+    report_.camera_exposure = exposure.length;
+    ++report_.published;
+}
+
 void CameraPipeline::log_later(LogLevel level, std::string text) {
     deferred_log_.push_back({level, std::move(text)});
 }
@@ -448,6 +540,10 @@ std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
 
 std::optional<pairing::Start> CameraPipeline::advance_locked(HostTime now) {
     frames_.heartbeat(now);
+    if (by_ptp()) {
+        by_ptp_.advance(now);
+        settle_ptp();
+    }
     if (!triggered()) return std::nullopt;
     evidence_.heartbeat(now);
     if (pairing_.due(now)) feed(pairing::Advance{now});
@@ -476,16 +572,19 @@ void CameraPipeline::buffer_underrun(std::uint64_t frames) {
 void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     const std::lock_guard lock(mutex_);
     check_.set_camera_exposure(exposure, since);
+    by_ptp_.set_exposure(exposure, since);
     report_.commanded_exposure = exposure;
 }
 
 void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
     const std::lock_guard lock(mutex_);
     check_.read_exposure(exposure, at, report_.start_delay);
+    by_ptp_.set_exposure(exposure, at);
 }
 
 bool CameraPipeline::wants_exposure_readings() {
     const std::lock_guard lock(mutex_);
+    if (by_ptp()) return report_.commanded_exposure.ns == 0;
     return triggered() && check_.wants_readings();
 }
 
@@ -514,8 +613,13 @@ PipelineReport CameraPipeline::report() {
     report_.stamp_instant = pairing_.stamped();
     report_.records_late_by = pairing_.records_late_by();
     report_.exposure = check_.measured();
-    report_.camera_exposure = check_.reported();
+    if (!by_ptp()) report_.camera_exposure = check_.reported();
     report_.exposure_contradicted = check_.contradicted();
+    if (by_ptp()) {
+        report_.pairing = by_ptp_.proved() ? pairing::State::locked : pairing::State::searching;
+        report_.stamp_instant = by_ptp_.stamped();
+        report_.start_delay = by_ptp_.start_delay();
+    }
     report_.lines = completion_.line_delays();
     report_.edges = check_.edges();
     report_.answers = answers_.report();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -16,6 +17,8 @@
 #include "engine/pairing/recording.hpp"
 #include "event_lengths.hpp"
 #include "plausibility/exposure_check.hpp"
+#include "ptp_clocks.hpp"
+#include "ptp_frames.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/evidence_recorder.hpp"
 #include "publish/exposure_completion.hpp"
@@ -41,6 +44,8 @@ struct PipelineReport {
     std::uint64_t triggers_without_frame = 0;
     std::uint64_t triggers_missed = 0;  ///< by the camera's own events
     bool ptp_lost = false;              ///< the same
+    std::uint64_t actions_refused = 0;  ///< triggers by PTP time that the camera did not take ...
+    std::uint16_t refusal = 0;          ///< ... and the newest GVCP status of one; 0: none
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -69,8 +74,9 @@ struct PipelineReport {
 /// Thread-safe. Whoever completes a pair publishes it.
 class CameraPipeline final : private pairing::Outcome {
  public:
+    /// `ptp`: for a camera that is triggered by PTP time, and outlives it.
     CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
-                   clock::Translator& translator, EventJournal& events);
+                   clock::Translator& translator, EventJournal& events, PtpClocks* ptp = nullptr);
 
     /// Makes the rings, or one with larger slots: called by the camera once it knows its payload.
     /// Slots are void then. `has_clock`: its stamps are its own.
@@ -112,6 +118,25 @@ class CameraPipeline final : private pairing::Outcome {
     /// By the camera's message channel.
     void add(const CameraEvent& event);
 
+    /// The next trigger of a camera that is triggered by PTP time.
+    struct PtpTurn {
+        std::optional<PtpTrigger> trigger;  ///< to be sent now: its frame is awaited
+        Duration wait;                      ///< until the next turn
+    };
+    PtpTurn next_ptp_trigger(HostTime now);
+
+    /// The camera acknowledged one, with its GVCP status: 0, or why it does not take it.
+    void acknowledge(std::uint64_t trigger, std::uint16_t status);
+
+    /// What a camera that is triggered by PTP time says of its PTP port, and what its clock shows.
+    void note_ptp(const PtpStatus& status);
+    void read_clock(const clock::ClockReading& reading);
+
+    /// Frames wait until its clock is read. `told`: called when that begins, on any thread, while
+    /// the pipeline is locked; none: nobody is.
+    bool wants_clock_reading();
+    void when_clock_reading_wanted(std::function<void()> told);
+
     /// The board sent no trigger for one grid point, and said so.
     void triggers_skipped(std::uint64_t count);
 
@@ -125,7 +150,8 @@ class CameraPipeline final : private pairing::Outcome {
     void start_requested(pairing::Start start, HostTime now);
 
     const std::string& name() const { return name_; }
-    bool triggered() const { return triggered_; }
+    bool triggered() const { return triggered_; }  ///< by the board
+    bool by_ptp() const { return clocks_ != nullptr; }
     unsigned output() const { return output_; }  ///< of the board
     std::uint8_t board_mask() const { return static_cast<std::uint8_t>(1U << output_); }
 
@@ -166,6 +192,9 @@ class CameraPipeline final : private pairing::Outcome {
     void note_chunk_lag();
     void note_missed_trigger();
     void note_ptp(bool lost);
+    void add_by_ptp(const pairing::Arrival& arrival);
+    void settle_ptp();
+    void publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure);
     FrameAccount account_of(const pairing::Arrival& arrival) const;
     void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
@@ -180,7 +209,9 @@ class CameraPipeline final : private pairing::Outcome {
     const std::uint32_t index_;
     clock::Translator& translator_;
     EventJournal& events_;
-    std::size_t stream_;  ///< of the translator's witnesses
+    std::size_t stream_;       ///< of the translator's witnesses
+    PtpClocks* const clocks_;  ///< none: it is not triggered by PTP time
+    const std::size_t clock_;  ///< its own of these
 
     std::mutex mutex_;
     CameraConfiguration configuration_;
@@ -198,6 +229,10 @@ class CameraPipeline final : private pairing::Outcome {
     bool missed_logged_ = false;             ///< in the log, of this stream
     std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
     StartWatchdog triggers_;
+    PtpFrames by_ptp_;
+    PtpStatus ptp_status_;
+    std::string port_logged_;
+    std::function<void()> reading_wanted_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;
     /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,

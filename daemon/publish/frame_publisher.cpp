@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
+#include "engine/rounding.hpp"
 #include "exposure_completion.hpp"
 #include "total_sigma.hpp"
 
@@ -13,6 +15,10 @@ namespace {
 
 /// Least descriptors of a ring: a reader that sleeps still learns how many frames it lost.
 constexpr std::uint32_t descriptor_floor = 64;
+
+/// What a clock that follows PTP may be off its master without saying so, with hardware stamps.
+/// Half: some switches add more. Twice: sigma is twice what good networks keep to.
+constexpr Duration closest_follower = microseconds(1);
 
 FrameMetadata describe(const pairing::Exposure& exposure) {
     FrameMetadata metadata{};
@@ -61,6 +67,21 @@ void FramePublisher::publish_guessed(const pairing::Arrival& arrival,
     metadata.flags |= flag_suspect;
     metadata.sigma_ns = sigma_unknown;
     publish(arrival, middle, metadata);
+}
+
+bool FramePublisher::publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure,
+                                    const clock::Stamp& middle, Duration offset) {
+    FrameMetadata metadata{};
+    metadata.trigger = exposure.trigger;
+    metadata.set_tick(exposure.tick);
+    metadata.flags = static_cast<std::uint32_t>(StampKind::camera_ptp);
+    if (exposure.length_known) {
+        metadata.exposure = exposure.length;
+        metadata.flags |= flag_camera_length;
+    }
+    const double others = std::hypot(offset.ns, closest_follower.ns, exposure.middle_sigma.ns);
+    metadata.sigma_ns = total_sigma_ns(middle.sigma_ns, rounded(others));
+    return publish(arrival, middle, metadata);
 }
 
 void FramePublisher::publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,

@@ -9,6 +9,7 @@
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "engine/ring/writer.hpp"
+#include "ptp_exposure.hpp"
 #include "settings/configuration.hpp"
 #include "stamp_guard.hpp"
 
@@ -41,6 +42,10 @@ class FramePublisher {
     /// The same, but that the frame is of this exposure is a guess: its sigma is unknown.
     void publish_guessed(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
                          const clock::Stamp& middle);
+
+    /// A frame of a camera whose clock follows PTP, as far off its master as `offset`.
+    bool publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure,
+                        const clock::Stamp& middle, Duration offset);
 
     /// A frame of which nothing but its arrival is known. `suspect`: it was triggered all the same.
     void publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,

@@ -13,8 +13,8 @@
 namespace versavis::daemon {
 
 const std::vector<std::string> preset_groups{
-    "default_settings", "known_state",    "trigger",     "strobe", "free_run",
-    "fixed_exposure",   "exposure_limit", "pulse_width", "chunks", "ptp"};
+    "default_settings", "known_state", "trigger", "strobe", "free_run", "fixed_exposure",
+    "exposure_limit",   "pulse_width", "chunks",  "ptp",    "action"};
 
 namespace {
 

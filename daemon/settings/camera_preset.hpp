@@ -17,7 +17,8 @@ namespace versavis::daemon {
 
 /// Sets the first of the features that the camera has to the first of the values that it takes.
 /// A text may be {trigger}, {trigger_line}, {strobe_line}, {edge}, {line_inverter}, {chunk},
-/// {chunk_gain} or {max_exposure_us}; the value "min" is the lowest that the camera allows.
+/// {chunk_gain}, {max_exposure_us}, {device_key}, {group_key} or {group_mask}; the value "min" is
+/// the lowest that the camera allows.
 struct PresetStep {
     std::string selector;  ///< is set first, to `selected`, where the camera has it
     std::string selected;
@@ -68,8 +69,8 @@ inline const std::string base_preset = "generic";
 /// default_settings: as after power-up; known_state: nothing that another program left behind takes
 /// part in the timing; trigger: by a line; strobe: the exposure on a line; free_run: without
 /// triggers; pulse_width: the trigger's length is the exposure's; chunks: exposure time with each
-/// frame; ptp; fixed_exposure: no auto exposure; exposure_limit: the longest that the camera's own
-/// auto exposure takes.
+/// frame; ptp; action: a trigger by scheduled action commands; fixed_exposure: no auto exposure;
+/// exposure_limit: the longest that the camera's own auto exposure takes.
 extern const std::vector<std::string> preset_groups;
 
 /// Where the presets are that belong to this program.

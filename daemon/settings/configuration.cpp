@@ -68,7 +68,7 @@ void check_feature_name(TableReader& reader, const TableReader& camera_keys, std
         return reader.fail(key, fmt::format("'{}' belongs to {}, it is no feature", key, tables),
                            move_to(tables));
     for (const auto& [feature, own] : own_features)
-        if (key == feature && camera.trigger == TriggerSource::board)
+        if (key == feature && camera.trigger != TriggerSource::free_run)
             reader.fail(key, fmt::format("'{}' is set by the service, from '{}'", key, own),
                         fmt::format("set '{}' of the camera instead", own));
 }

@@ -53,7 +53,7 @@ struct ClockConfiguration {
     clock::SecondConflict on_second_conflict = clock::SecondConflict::flag;
 };
 
-enum class TriggerSource { board, free_run };
+enum class TriggerSource { board, free_run, ptp };
 enum class Strobe { active_high, active_low, none };
 enum class ReceiveMode { automatic, socket, packet };
 enum class OnUnproved { withhold, flag };

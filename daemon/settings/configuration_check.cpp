@@ -214,9 +214,10 @@ std::string wrong_with_master(const Configuration& configuration,
 
 void check_master(const Configuration& configuration, const CameraConfiguration& slave,
                   Findings& findings) {
-    if (slave.trigger == TriggerSource::free_run)
+    if (slave.trigger != TriggerSource::board)
         return findings.add(slave.entry, "master",
-                            "a camera with trigger = \"free\" cannot have a 'master'",
+                            fmt::format("a camera with trigger = \"{}\" cannot have a 'master'",
+                                        slave.trigger == TriggerSource::ptp ? "ptp" : "free"),
                             "remove one of the two");
     for (const char* key : {"rate_hz", "phase_us", "max_exposure_us"})
         if (slave.entry.has(key))
@@ -262,6 +263,21 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
               "the period less 'latency_us' and 'gap_us'", slower);
         limit("exposure_us", camera.exposure_us, camera.max_exposure_us, "'max_exposure_us'",
               "lower it, or raise 'max_exposure_us'");
+    }
+}
+
+/// Their frames are proved by the camera's clock and by exposures of a known length.
+void check_ptp(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        if (camera.trigger != TriggerSource::ptp) continue;
+        if (!camera.camera_clock)
+            findings.add(camera.entry, "camera_clock",
+                         "with trigger = \"ptp\" frames are stamped by the camera's clock",
+                         "remove 'camera_clock', or trigger the camera by the board");
+        if (camera.exposure_by_pulse)
+            findings.add(camera.entry, "exposure",
+                         "with trigger = \"ptp\" there is no trigger pulse that sets the exposure",
+                         "set exposure = \"timed\"");
     }
 }
 
@@ -369,6 +385,7 @@ void check_preset(const CameraConfiguration& camera, const std::vector<CameraPre
     const std::tuple<const char*, const char*, bool> asked[]{
         {"chunks", "chunks", camera.chunks.value_or(false)},
         {"ptp", "ptp", camera.ptp},
+        {"trigger", "action", camera.trigger == TriggerSource::ptp},
         {"exposure", "pulse_width", camera.exposure_by_pulse}};
     for (const auto& [key, group, wanted] : asked)
         if (wanted && preset->groups.at(group).empty())
@@ -557,19 +574,30 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
                        "lower it");
 }
 
-constexpr void (*rules[])(const Configuration&, Findings&){
-    check_instance,    check_link,
-    check_pps,         check_names,
-    check_devices,     check_outputs,
-    check_masters,     check_camera_times,
-    check_line_delays, check_exposure_features,
-    check_glitch,      check_auto_exposure,
-    check_paths,       check_presets,
-    check_imus,        check_illumination,
-    check_inputs,      check_uart_and_imu_output,
-    check_test_rate,   check_pulse_outputs,
-    check_history,     check_receive,
-    check_time_outputs};
+constexpr void (*rules[])(const Configuration&, Findings&){check_instance,
+                                                           check_link,
+                                                           check_pps,
+                                                           check_names,
+                                                           check_devices,
+                                                           check_outputs,
+                                                           check_masters,
+                                                           check_camera_times,
+                                                           check_ptp,
+                                                           check_line_delays,
+                                                           check_exposure_features,
+                                                           check_glitch,
+                                                           check_auto_exposure,
+                                                           check_paths,
+                                                           check_presets,
+                                                           check_imus,
+                                                           check_illumination,
+                                                           check_inputs,
+                                                           check_uart_and_imu_output,
+                                                           check_test_rate,
+                                                           check_pulse_outputs,
+                                                           check_history,
+                                                           check_receive,
+                                                           check_time_outputs};
 
 }  // namespace
 

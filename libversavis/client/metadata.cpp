@@ -9,6 +9,7 @@ const char* to_string(StampKind kind) {
         case StampKind::predicted_middle: return "predicted";
         case StampKind::trigger_edge: return "trigger";
         case StampKind::arrival: return "arrival";
+        case StampKind::camera_ptp: return "ptp";
     }
     return "unknown";
 }

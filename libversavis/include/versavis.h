@@ -79,7 +79,9 @@ enum { /* bits of flags */
     VERSAVIS_REPEATED = 1 << 6,
     VERSAVIS_ACCEL_AGE = 1 << 7,
     VERSAVIS_CAMERA_LENGTH = 1 << 8,
-    VERSAVIS_SECOND_DOUBTED = 1 << 9
+    VERSAVIS_SECOND_DOUBTED = 1 << 9,
+    VERSAVIS_BY_PTP = 1 << 10 /* of a stamp of kind 3: not the arrival, but the exposure by the
+                               * camera's own clock, which follows PTP */
 };
 
 #define VERSAVIS_SIGMA_UNKNOWN 0xFFFFFFFFu

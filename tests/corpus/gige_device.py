@@ -9,6 +9,8 @@ from device import NOT_IMPLEMENTED, OK, Device
 PORT, KEY = 3956, 0x42
 DISCOVERY, READ_REGISTER, WRITE_REGISTER, READ_MEMORY, WRITE_MEMORY = 0x02, 0x80, 0x82, 0x84, 0x86
 BOOTSTRAP_END = 0xA000
+# It writes memory, takes actions, scheduled ones too, and follows PTP.
+CAPABILITIES = 1 << 1 | 1 << 6 | 1 << 17 | 1 << 19
 
 
 class GigeDevice(Device):
@@ -24,7 +26,8 @@ class GigeDevice(Device):
         ip = struct.unpack(">I", socket.inet_aton(self.address))[0]
         self.nodes.store(0, bytes(BOOTSTRAP_END))
         for at, value in ((0x0, 0x00010002), (0x4, 0x80000001), (0x8, 0x0200), (0xC, ip),
-                          (0x24, ip), (0x34, 0xFF000000), (0x600, 1), (0x904, 1), (0x934, 2),
+                          (0x24, ip), (0x34, 0xFF000000), (0x600, 1), (0x904, 1), (0x908, 1),
+                          (0x934, CAPABILITIES),
                           (0x938, 3000), (0x940, 1_000_000_000), (0xD04, 1500)):
             self.nodes.store(at, struct.pack(">I", value))
         for at, size, text in ((0x48, 32, vendor), (0x68, 32, model), (0x88, 32, "1.0"),

@@ -285,7 +285,7 @@ class NodeMap:
             return f"?{value}"
         if isinstance(value, bool):
             return str(value).lower()
-        return value if isinstance(value, str) else f"{value:g}"
+        return value if isinstance(value, str) else f"{value:.10g}"
 
     def violation(self, name):
         """Why the value that a feature has now cannot be; None: it can."""

@@ -288,7 +288,14 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
           "4:15: 'packet_size' must be a whole number from 576 to 16000 bytes, but is 20" +
               see_manual},
          {"trigger = 'bord'\n",
-          "4:11: 'trigger' must be one of board, free, but is 'bord'; did you mean \"board\"?"},
+          "4:11: 'trigger' must be one of board, free, ptp, but is 'bord'; did you mean "
+          "\"board\"?"},
+         {"trigger = 'ptp'\ncamera_clock = false\n",
+          "5:16: with trigger = \"ptp\" frames are stamped by the camera's clock; remove "
+          "'camera_clock', or trigger the camera by the board"},
+         {"trigger = 'ptp'\nexposure = 'pulse'\n",
+          "5:12: with trigger = \"ptp\" there is no trigger pulse that sets the exposure; set "
+          "exposure = \"timed\""},
          {"strobe = 1\n",
           "4:10: 'strobe' must be one of active_high, active_low, none, but is 1" + see_manual},
          {"glitch_us = 0\n",

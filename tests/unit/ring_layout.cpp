@@ -83,7 +83,7 @@ TEST_CASE_METHOD(Ring, "ring_layout: the header of a ring with payloads") {
     const std::string file = bytes("frames");
     CHECK(file.substr(0, 8) == "VERSAVIS");
     CHECK(u32(file, 8) == 1);
-    CHECK(u32(file, 12) == 9);
+    CHECK(u32(file, 12) == 10);
     CHECK(u64(file, 168) != 0);
     struct stat space {};
     REQUIRE(::stat("/proc/self/ns/pid", &space) == 0);

@@ -13,11 +13,12 @@ from . import _library as library
 from .errors import Overtaken, Released, ViewEscaped, error_of
 from .times import Time
 
-STAMP_KINDS = ("measured", "predicted", "trigger", "arrival")
+STAMP_KIND = 0x403  # these bits of the flags
+STAMP_KINDS = {0: "measured", 1: "predicted", 2: "trigger", 3: "arrival", 0x403: "ptp"}
 
 
 class Flags(enum.IntFlag):
-    """Bits of `flags`. The two lowest bits are the kind of stamp."""
+    """Bits of `flags`. Bits 0, 1 and 10 are the kind of stamp."""
 
     SUSPECT = 1 << 2
     HOLDOVER = 1 << 3
@@ -151,7 +152,7 @@ class Frame(Item):
 
     @property
     def tick(self):
-        """The board's grid point, equal for cameras that exposed together; None: not triggered."""
+        """The grid point, equal for cameras that exposed together; None: not triggered."""
         data = self._item.data.frame
         return data.tick_high << 32 | data.tick_low if data.trigger else None
 
@@ -167,8 +168,8 @@ class Frame(Item):
 
     @property
     def stamp(self):
-        """What the time is: "measured", "predicted", "trigger" or "arrival"."""
-        return STAMP_KINDS[self._item.data.frame.flags & 3]
+        """What the time is: "measured", "predicted", "trigger", "arrival" or "ptp"."""
+        return STAMP_KINDS.get(self._item.data.frame.flags & STAMP_KIND, "unknown")
 
     gain = property(lambda self: self._sensor("gain"),
                     doc="Of the sensor, by the camera: dB, or its own unit; None: not known.")

@@ -229,7 +229,9 @@ class Processing {
         }
         const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
         stream.counts.contradicted += contradicted ? 1U : 0U;
-        if (frame.stamp_kind() != StampKind::arrival && !contradicted) {
+        const bool by_board =
+            frame.stamp_kind() != StampKind::arrival && frame.stamp_kind() != StampKind::camera_ptp;
+        if (by_board && !contradicted) {
             read.stamp = restamping_.stamp(frame.board_time, frame.host_time);
             read.choice = Choice::no_estimate;
             const bool measured = frame.stamp_kind() == StampKind::measured_middle;

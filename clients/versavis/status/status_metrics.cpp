@@ -15,7 +15,7 @@ using nlohmann::json;
 enum class Type { gauge, counter };
 
 /// Where the key of a family is, and what labels its samples.
-enum class Part { top, board, clock, camera, imu, time_output, stream };
+enum class Part { top, board, clock, ptp, camera, imu, time_output, stream };
 
 struct Family {
     std::string_view name;  ///< without the _total of counters; the unit is its end
@@ -102,6 +102,14 @@ constexpr Family families[] = {
      "Published samples with a failed check."},
     {"versavis_imu_samples_doubted", "", Type::counter, Part::imu, "doubted", 1,
      "Samples withheld: implausible number, time or flags."},
+    {"versavis_ptp_sigma_seconds", "seconds", Type::gauge, Part::ptp, "sigma_ns", 1e9,
+     "One standard deviation of PTP's time on the host's clock."},
+    {"versavis_ptp_bound_seconds", "seconds", Type::gauge, Part::ptp, "bound_ns", 1e9,
+     "Limit of its error."},
+    {"versavis_ptp_minus_utc_seconds", "seconds", Type::gauge, Part::ptp, "minus_utc_ns", 1e9,
+     "PTP's time less the host's UTC."},
+    {"versavis_ptp_steps", "", Type::counter, Part::ptp, "steps", 1,
+     "Times that PTP's time stepped."},
     {"versavis_time_output_pulses", "", Type::counter, Part::time_output, "pulses", 1,
      "Seconds of UTC that the board gave a pulse."},
     {"versavis_time_output_error_seconds", "seconds", Type::gauge, Part::time_output, "error_ns",
@@ -225,6 +233,7 @@ const char* kind_of(Part part) {
         case Part::time_output: return "time_outputs";
         case Part::stream: return "streams";
         case Part::board: return "board";
+        case Part::ptp: return "ptp";
         default: return "clock";
     }
 }

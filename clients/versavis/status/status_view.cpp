@@ -114,6 +114,16 @@ std::string clock_lines(const json& clock, Detail detail, Hints& hints) {
            hints.of(clock, "clock");
 }
 
+std::string ptp_lines(const json& ptp) {
+    std::string line = fmt::format("ptp      {:<10} ", text(ptp, "state"));
+    const json ahead_ns = ptp.value("minus_utc_ns", json());
+    line += ahead_ns.is_number() ? fmt::format("{:.3f} s ahead of UTC  sigma {} us, bound {} us",
+                                               ahead_ns.get<double>() * 1e-9,
+                                               in_us(ptp, "sigma_ns"), in_us(ptp, "bound_ns"))
+                                 : std::string("unknown");
+    return wrapped_part(line);
+}
+
 /// Name, state and model of a device, and how much of its rate it delivers.
 std::string delivery(const json& device) {
     return fmt::format("{:<8} {:<10} {}  {:.1f} of {:g} Hz", text(device, "name"),
@@ -311,6 +321,7 @@ std::string status_text(const json& status, Detail detail, Colour colour) {
         add(*board, board_lines(*board, detail, hints));
     if (const auto clock = status.find("clock"); clock != status.end())
         add(*clock, clock_lines(*clock, detail, hints));
+    if (const json ptp = status.value("ptp", json()); ptp.is_object()) add(ptp, ptp_lines(ptp));
     for (const json& camera : status.value("cameras", json::array()))
         add(camera, camera_lines(camera, detail, hints));
     for (const json& imu : status.value("imus", json::array()))

@@ -61,6 +61,8 @@ constexpr FindingText texts[] = {
      "an edge of the exposure line is missing: the middle is predicted"},
     {Finding::no_hardware, Grade::plausible, "no_hardware",
      "no exposure of the board is known: the stamp is the arrival's"},
+    {Finding::by_camera, Grade::plausible, "by_camera",
+     "the stamp is by the camera's own clock, which followed PTP: nothing recorded confirms it"},
     {Finding::no_camera_clock, Grade::plausible, "no_camera_clock",
      "the camera has no clock that confirms the pairing"},
     {Finding::no_start, Grade::plausible, "no_start",

@@ -46,6 +46,7 @@ enum class Finding : std::uint8_t {
     // plausible
     no_edges,
     no_hardware,
+    by_camera,
     no_camera_clock,
     no_start,
     no_exchange,

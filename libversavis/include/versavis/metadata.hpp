@@ -12,17 +12,19 @@
 
 namespace versavis {
 
-/// Where a frame's stamp comes from, best first.
+/// Where a frame's stamp comes from, best first but for the last.
 enum class StampKind : std::uint32_t {
     measured_middle = 0,  ///< both edges of the exposure were stamped by hardware
     predicted_middle =
         1,  ///< an edge is missing: start or end follow from the configured or expected exposure
     trigger_edge = 2,  ///< only the trigger pulse is known: latency and exposure are as configured
     arrival = 3,       ///< no trigger: the moment the frame arrived on the host
+    camera_ptp = 0x403,  ///< by the camera's own clock, which follows PTP; no board saw the
+                         ///< exposure. Since ABI 1.10; older readers take it for `arrival`
 };
 
 enum ItemFlag : std::uint32_t {
-    stamp_kind_mask = 0x3,    ///< StampKind
+    stamp_kind_mask = 0x403,  ///< StampKind
     flag_suspect = 1U << 2U,  ///< the pairing is not proved: trigger and stamp are a guess
     flag_holdover =
         1U << 3U,             ///< the clocks lost contact, or messages contradict them: sigma grows
@@ -39,13 +41,13 @@ enum ItemFlag : std::uint32_t {
 inline constexpr std::uint32_t sigma_unknown = 0xFFFFFFFFU;
 
 struct FrameMetadata {
-    std::uint64_t trigger;  ///< pulses the board had sent to this camera, this frame's included; 0:
-                            ///< not triggered
+    std::uint64_t trigger;   ///< pulses the board had sent to this camera, or triggers by PTP time,
+                             ///< this frame's included; 0: not triggered
     std::uint64_t block_id;  ///< the camera's own frame number
-    BoardTime board_time;    ///< middle of the exposure
+    BoardTime board_time;    ///< middle of the exposure; 0: the board did not see it
     HostTime host_time;      ///< middle of the exposure
     HostTime arrival;        ///< the frame was complete on the host
-    Duration exposure;       ///< measured, or with flag_camera_length; 0: unknown
+    Duration exposure;       ///< measured, or with flag_camera_length by the camera; 0: unknown
     CameraTime camera_time;  ///< as the camera stamped it; 0: unknown
     std::uint32_t sigma_ns;  ///< one standard deviation of the output time
     std::uint32_t width;

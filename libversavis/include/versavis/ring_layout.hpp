@@ -29,7 +29,7 @@ namespace versavis::ring {
 
 inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
 inline constexpr std::uint32_t abi_major = 1;
-inline constexpr std::uint32_t abi_minor = 9;
+inline constexpr std::uint32_t abi_minor = 10;
 inline constexpr std::size_t page_size = 4096;
 inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's words
 inline constexpr std::size_t metadata_words = 12;

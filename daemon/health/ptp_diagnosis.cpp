@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ptp_diagnosis.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "status.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// GVCP's words for an action that a camera does not take as it should.
+constexpr std::uint16_t no_reference_time = 0x8013;
+constexpr std::uint16_t overflow = 0x8015;
+constexpr std::uint16_t action_late = 0x8016;
+
+/// Of actions or frames; fewer may be chance.
+constexpr double telling_part = 0.1;
+
+/// An offset of stamps that is nearly as long as the exposure, or half of it.
+constexpr Duration nearly = microseconds(200);
+
+std::string in_us(Duration duration) { return fmt::format("{} us", duration.ns / 1000); }
+
+std::string port_hint(const PtpClockReport& clock) {
+    const std::string& state = clock.status.state;
+    if (state.empty()) return "it does not say whether its clock follows PTP";
+    if (state == "Slave") return "its clock is close to no master yet: its PTP servo is not locked";
+    if (state == "Uncalibrated") return "its clock begins to follow a PTP master";
+    if (state == "Disabled" || state == "Faulty")
+        return fmt::format("its PTP port is {}: restart the camera, or power it off and on", state);
+    return fmt::format(
+        "its PTP port is {}: it hears no master; start ptp4l on the interface of this camera, and "
+        "check that switches pass PTP (UDP ports 319 and 320)",
+        state);
+}
+
+/// A camera with another grandmaster that says so explains most.
+std::string other_time_hint(const PtpClockReport& clock, const PtpReport& ptp) {
+    for (const PtpClockReport& other : ptp.clocks)
+        if (other.agreement == clock::Agreement::agrees && !other.status.grandmaster.empty() &&
+            !clock.status.grandmaster.empty() &&
+            other.status.grandmaster != clock.status.grandmaster)
+            return fmt::format(
+                "its clock shows another time than that of {}, and it follows another PTP master "
+                "({} instead of {}): stop one of the two masters, or give both one domain",
+                other.name, clock.status.grandmaster, other.status.grandmaster);
+    return "its clock shows another time than those of the other cameras, or than before: is there "
+           "a second PTP master, or did the master's time step?";
+}
+
+std::string refusal_hint(std::uint16_t status) {
+    switch (status) {
+        case no_reference_time:
+            return "the camera refuses scheduled actions: its clock follows no PTP master";
+        case overflow: return "the camera cannot keep the next scheduled action: lower 'rate_hz'";
+        case action_late:
+            return "scheduled actions reach the camera too late: lower the load of host and "
+                   "network, or 'rate_hz'";
+        default:
+            return fmt::format(
+                "the camera refuses scheduled actions (GVCP status {:#06x}): update "
+                "its firmware, or trigger it by the board",
+                status);
+    }
+}
+
+/// Its frames' stamps are none that its triggers make.
+std::string stamps_hint(const CameraStatus& camera) {
+    const Duration off = camera.pipeline.start_delay;
+    const Duration exposure = camera.pipeline.commanded_exposure;
+    if (absolute(off) > period_of(camera.configuration))
+        return fmt::format(
+            "its frames are stamped {:.3f} s off what its own clock shows: they are of another "
+            "clock, which PTP does not steer; update its firmware, or trigger it by the board",
+            static_cast<double>(off.ns) * 1e-9);
+    for (const auto& [part, instant] : {std::pair{exposure, "end"}, {exposure / 2, "middle"}})
+        if (exposure.ns != 0 && absolute(off - part) < nearly)
+            return fmt::format(
+                "its frames are stamped {} after the trigger: is that the {} of the exposure? then "
+                "set stamp_instant = \"{}\"; if it is its latency, set latency_us = {}",
+                in_us(off), instant, instant, off.ns / 1000);
+    return fmt::format(
+        "its frames are stamped {} after the trigger: if that is the camera's latency, set "
+        "latency_us = {}",
+        in_us(off), off.ns / 1000);
+}
+
+bool telling(std::uint64_t part, std::uint64_t whole) {
+    return part >= 2 && static_cast<double>(part) > telling_part * static_cast<double>(whole);
+}
+
+}  // namespace
+
+PtpFinding diagnose_ptp(const CameraStatus& camera, const Status& all) {
+    if (camera.configuration.trigger != TriggerSource::ptp || !all.ptp) return {};
+    const auto clock = std::find_if(all.ptp->clocks.begin(), all.ptp->clocks.end(),
+                                    [&](const auto& it) { return it.name == camera.name; });
+    if (clock == all.ptp->clocks.end()) return {};
+    if (!all.ptp->master.empty())
+        return {Fault::ptp_master,
+                fmt::format("{} is a PTP master, and all that follow it are wrong: no camera is "
+                            "triggered; make it slave only, and start a better master (ptp4l)",
+                            all.ptp->master)};
+    if (!clock->status.follows()) return {Fault::ptp_lost, port_hint(*clock)};
+    if (clock->agreement == clock::Agreement::differs)
+        return {Fault::ptp_other_time, other_time_hint(*clock, *all.ptp)};
+    const PipelineReport& recent = camera.recent;
+    if (telling(recent.actions_refused, recent.triggers))
+        return {Fault::ptp_refused, refusal_hint(camera.pipeline.refusal)};
+    const std::uint64_t misfits = recent.refused[static_cast<std::size_t>(EventReason::mismatch)];
+    if (telling(misfits, recent.received)) return {Fault::ptp_stamps, stamps_hint(camera)};
+    return {};
+}
+
+}  // namespace versavis::daemon
