@@ -123,6 +123,12 @@ std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostT
     return unit != nullptr ? unit->pipeline->add(record, received) : std::nullopt;
 }
 
+void CameraGroup::auxiliary_pulse(unsigned input, BoardTime at) {
+    const std::string& name = pulse_input_names[wire::pulse_aux0 + input];
+    for (const Unit& unit : units_)
+        if (unit.pipeline->strobe_input() == name) unit.pipeline->line_rose(at);
+}
+
 void CameraGroup::triggers_skipped(unsigned output, std::uint64_t count) {
     if (const Unit* unit = at_output(output)) unit->pipeline->triggers_skipped(count);
 }
@@ -145,9 +151,10 @@ const CameraGroup::Unit* CameraGroup::at_output(unsigned output) const {
     return nullptr;
 }
 
-bool CameraGroup::any_triggered() const {
-    return std::any_of(units_.begin(), units_.end(),
-                       [](const Unit& unit) { return unit.pipeline->triggered(); });
+bool CameraGroup::any_needs_board() const {
+    return std::any_of(units_.begin(), units_.end(), [](const Unit& unit) {
+        return unit.pipeline->triggered() || !unit.pipeline->strobe_input().empty();
+    });
 }
 
 std::optional<PtpReport> CameraGroup::ptp() {

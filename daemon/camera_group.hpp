@@ -51,13 +51,16 @@ class CameraGroup {
     /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
+    /// A pulse at an auxiliary input of the board.
+    void auxiliary_pulse(unsigned input, BoardTime at);
+
     /// The board said that this output got no trigger.
     void triggers_skipped(unsigned output, std::uint64_t count);
 
     /// Names an event of the camera at output `entry.source`, which becomes the camera's number.
     void name_source(JournalEntry& entry) const;
 
-    bool any_triggered() const;
+    bool any_needs_board() const;  ///< it triggers a camera, or sees one
     const std::vector<CameraPreset>& presets() const { return environment_.presets; }
     std::vector<CameraStatus> status() const;
     std::vector<StreamStatus> streams() const;

@@ -243,6 +243,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     const auto doubt = event_witness_.judge(event, received);
     if (!doubt) use_pps(event);
     if (!doubt) check_time_pulse(event, received);
+    if (!doubt && event.kind == wire::BoardEventKind::aux_pulse)
+        cameras_->auxiliary_pulse(event.source, BoardTime{event.time_ns});
     auto entry = journal_entry(event);
     if (!entry) return;
     if (doubt) {

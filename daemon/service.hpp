@@ -64,7 +64,7 @@ class Service final : public Controlled, private BoardListener {
     Expected<> make_rings();
     Expected<> make_cameras();
     bool board_needed() const {
-        return !imus_.empty() || cameras_->any_triggered() || time_announcer_.wanted();
+        return !imus_.empty() || cameras_->any_needs_board() || time_announcer_.wanted();
     }
     void announce(HostTime now);
     void check_time_pulse(const wire::Event& event, HostTime received);

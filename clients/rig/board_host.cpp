@@ -248,6 +248,7 @@ void BoardHost::live() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
         if (utc_) hear_gnss();
+        hear_auxiliaries();
         const HostTime next_sample = signal_samples();
         board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
         const firmware::Nanoseconds now = board_now();
@@ -261,6 +262,24 @@ void BoardHost::live() {
         const HostTime comes = coming_.empty() ? wake : coming_.front().first;
         wait(std::min({wake, leaves, comes, next_sample, host_now() + longest_wait}));
     }
+}
+
+void BoardHost::show_auxiliary(const CameraScenario& camera, const LineActive& line) {
+    const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
+    const auto input =
+        static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_aux0} +
+                                  static_cast<unsigned>(camera.aux_input));
+    const bool active = line.inverted == camera.line_inverted;
+    const std::lock_guard lock(auxiliary_mutex_);
+    auxiliary_edges_.push_back({line.begin + late(camera.line_rising_us), input, active});
+    auxiliary_edges_.push_back({line.end + late(camera.line_falling_us), input, !active});
+}
+
+void BoardHost::hear_auxiliaries() {
+    const std::lock_guard lock(auxiliary_mutex_);
+    for (const AuxiliaryEdge& edge : auxiliary_edges_)
+        board_->schedule_edge({clock_->device_ns(edge.at), edge.input, edge.level});
+    auxiliary_edges_.clear();
 }
 
 /// The pulse at each second, and its sentences.

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <deque>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -38,6 +39,9 @@ class BoardHost {
     /// From now on, for as long as the fault says. Callable from any thread.
     void suffer(const Fault& fault);
 
+    /// An auxiliary input shows this. Callable from any thread.
+    void show_auxiliary(const CameraScenario& camera, const LineActive& line);
+
  private:
     BoardHost(const World& world, std::string socket_path, std::vector<GenicamCamera*> cameras,
               std::unique_ptr<EmulatedChip> chip, FileDescriptor listener);
@@ -49,6 +53,7 @@ class BoardHost {
     void wait(HostTime until) const;
     void exchange_bytes();
     void hear_gnss();
+    void hear_auxiliaries();
     HostTime signal_samples();
     void accept_host();
     void drop_host();
@@ -96,6 +101,13 @@ class BoardHost {
     Parcels late_;    ///< on its way to the host
     Parcels coming_;  ///< on its way from there
     bool plugged_ = true;
+    struct AuxiliaryEdge {
+        HostTime at;
+        std::uint8_t input;
+        bool level;
+    };
+    std::mutex auxiliary_mutex_;
+    std::vector<AuxiliaryEdge> auxiliary_edges_;  ///< that the board is still to hear of
     std::array<std::atomic<std::int64_t>, fault_kinds> suffers_until_ns_{};
     std::atomic<std::int64_t> lateness_ns_{0};  ///< of late records
     std::atomic<bool> reset_pending_{false};

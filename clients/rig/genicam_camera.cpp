@@ -32,6 +32,9 @@ HostTime stamped(const CameraScenario& camera, HostTime start, HostTime end) {
     }
 }
 
+/// A scheduled action is taken so much earlier: then the board hears of the line's edges in time.
+constexpr Duration action_lead = milliseconds(22);
+
 PtpFollower::Settings ptp_settings(const CameraScenario& camera) {
     return {camera.clock, Duration{std::llround(camera.ptp_lock_s * 1e9)},
             std::llround(camera.ptp_error_ns), std::llround(camera.ptp_swing_ns)};
@@ -162,12 +165,20 @@ void GenicamCamera::take_actions(HostTime now) {
         HostTime due;
         {
             const std::lock_guard lock(mutex_);
-            if (actions_.empty() || actions_.front() > now) return;
+            if (actions_.empty() || actions_.front() > now + action_lead) return;
             due = actions_.front();
             actions_.pop_front();
         }
-        expose(due, nullptr);
+        const auto exposure = expose(due, nullptr);
+        const std::lock_guard lock(mutex_);
+        const auto line = exposure ? shown({*exposure}) : std::nullopt;
+        if (line && show_action_) show_action_(*line);
     }
+}
+
+void GenicamCamera::show_actions(std::function<void(const LineActive&)> show) {
+    const std::lock_guard lock(mutex_);
+    show_action_ = std::move(show);
 }
 
 bool GenicamCamera::poll(HostTime now) {

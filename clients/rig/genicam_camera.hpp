@@ -64,6 +64,8 @@ class GenicamCamera {
     std::optional<LineActive> trigger_line(bool level, const TriggerPulse& pulse);
     /// Calls `afflict` at each fault of the board that begins with an exposure of this camera.
     void afflict_board(std::function<void(const Fault&)> afflict);
+    /// Calls `show` with each exposure that a scheduled action makes, before it begins.
+    void show_actions(std::function<void(const LineActive&)> show);
     const CameraScenario& settings() const { return settings_; }
 
     // For the transport.
@@ -138,6 +140,7 @@ class GenicamCamera {
     HostTime free_run_next_;
     std::deque<HostTime> actions_;  ///< scheduled
     std::function<void(const Fault&)> afflict_board_;
+    std::function<void(const LineActive&)> show_action_;
 
     std::atomic<std::int64_t> muted_until_ns_{INT64_MIN};
     std::atomic<bool> reboots_{false};

@@ -22,10 +22,22 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
     auto board = BoardHost::create(world, socket_path, wired);
     if (!board) return Unexpected(board.error());
     rig->board_ = std::move(*board);
-    for (GenicamCamera* camera : wired)
+    for (GenicamCamera* camera : wired) {
         camera->afflict_board(
             [host = rig->board_.get()](const Fault& fault) { host->suffer(fault); });
+        if (camera->settings().aux_input >= 0)
+            camera->show_actions([host = rig->board_.get(), camera](const LineActive& line) {
+                host->show_auxiliary(camera->settings(), line);
+            });
+    }
     return rig;
+}
+
+Rig::~Rig() {
+    for (const auto& camera : cameras_) {
+        camera->camera().afflict_board({});
+        camera->camera().show_actions({});
+    }
 }
 
 }  // namespace versavis::rig

@@ -20,6 +20,11 @@ class Rig {
                                                 const std::string& socket_path,
                                                 const std::string& truth_path);
 
+    /// Cameras outlive the board, and must not show it anything more.
+    ~Rig();
+    Rig(const Rig&) = delete;
+    Rig& operator=(const Rig&) = delete;
+
  private:
     Rig(HostTime zero, const Scenario& scenario) : surroundings_(zero, scenario) {}
 

@@ -51,6 +51,7 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("output", camera.output, 0, 3);
     reader.read("input", camera.input, -1, 3);
     reader.read("second_input", camera.second_input, -1, 3);
+    reader.read("aux_input", camera.aux_input, -1, 1);
     reader.choose<LineShows>("line", camera.line,
                              {{"exposure", LineShows::exposure},
                               {"trigger", LineShows::trigger},

@@ -52,6 +52,8 @@ struct CameraScenario {
     unsigned output = 0;    ///< of the board, that triggers it
     int input = -1;         ///< of the board, that its exposure line is wired to; -1: as the output
     int second_input = -1;  ///< that it is wired to as well; -1: none
+    int aux_input = -1;     ///< auxiliary one that its line is wired to, where scheduled actions
+                            ///< trigger it; -1: none
     LineShows line = LineShows::exposure;
     bool line_inverted = false;     ///< low while it exposes
     bool trigger_inverted = false;  ///< its trigger wire

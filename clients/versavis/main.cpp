@@ -21,6 +21,7 @@
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
 #include "commands/gnss_command.hpp"
+#include "commands/graph_command.hpp"
 #include "commands/lidar_command.hpp"
 #include "commands/list.hpp"
 #include "commands/monitor_commands.hpp"
@@ -153,6 +154,8 @@ int main(int argc, char** argv) {
 
     client::DoctorCommand doctor(app);
 
+    client::GraphCommand graph(app);
+
     auto* list = app.add_subcommand("list", "List the streams that can be read");
     list->add_flag("--json", json, "Print a JSON array");
 
@@ -225,6 +228,7 @@ int main(int argc, char** argv) {
                      : show_status(instance, {json, verbose});
     if (wiring.chosen()) return wiring.run(instance);
     if (doctor.chosen()) return doctor.run(instance, VERSAVIS_VERSION);
+    if (graph.chosen()) return graph.run(instance, instance_option->count() > 0);
     if (monitor.chosen()) return monitor.run(instance);
     if (*list) {
         const auto text = client::list_streams(instance, json);

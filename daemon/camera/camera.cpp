@@ -444,6 +444,7 @@ void Camera::describe(const CameraSetup& setup) {
 /// The board and the status learn it before Aravis takes its time to let the camera go.
 void Camera::lose() {
     streaming_ = false;
+    if (pipeline_.by_ptp()) pipeline_.note_ptp({});
     hooks_.lost();
 }
 
@@ -466,6 +467,10 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     }
     std::optional<PtpReader> ptp;
     if (pipeline_.by_ptp()) {
+        if (!device_)
+            return problem(CameraState::misconfigured,
+                           {configuration_.name, "trigger = \"ptp\" needs a GigE Vision camera",
+                            "trigger this camera by the board"});
         auto reader = PtpReader::create(nodes, configuration_.name);
         if (!reader) return problem(CameraState::misconfigured, reader.error());
         ptp.emplace(std::move(*reader));

@@ -93,7 +93,7 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
     }
     if (!configuration.auto_exposure.enabled) groups.emplace_back("exposure_limit");
     groups.emplace_back(by_ptp ? "action" : "trigger");
-    if (by_ptp) return groups;
+    if (by_ptp && configuration.strobe_input.empty()) return groups;
     if (configuration.exposure_by_pulse) groups.emplace_back("pulse_width");
     if (configuration.strobe != Strobe::none) groups.emplace_back("strobe");
     return groups;

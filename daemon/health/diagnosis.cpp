@@ -478,6 +478,7 @@ constexpr Rule camera_rules[] = {
     {Fault::ptp_master, by_ptp<Fault::ptp_master>, ptp_hint},
     {Fault::ptp_lost, by_ptp<Fault::ptp_lost>, ptp_hint},
     {Fault::ptp_other_time, by_ptp<Fault::ptp_other_time>, ptp_hint},
+    {Fault::ptp_contradicted, by_ptp<Fault::ptp_contradicted>, ptp_hint},
     {Fault::ptp_refused, by_ptp<Fault::ptp_refused>, ptp_hint},
     {Fault::ptp_stamps, by_ptp<Fault::ptp_stamps>, ptp_hint},
     {Fault::link_full,
@@ -734,6 +735,7 @@ const char* to_string(Fault fault) {
         case Fault::ptp_other_time: return "ptp_other_time";
         case Fault::ptp_refused: return "ptp_refused";
         case Fault::ptp_stamps: return "ptp_stamps";
+        case Fault::ptp_contradicted: return "ptp_contradicted";
         case Fault::imu_missing: return "imu_missing";
         case Fault::imu_wrong: return "imu_wrong";
         case Fault::imu_silent: return "imu_silent";

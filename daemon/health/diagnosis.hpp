@@ -73,6 +73,7 @@ enum class Fault {
     ptp_other_time,
     ptp_refused,
     ptp_stamps,
+    ptp_contradicted,
     // Of an IMU.
     imu_missing,
     imu_wrong,

@@ -89,6 +89,21 @@ std::string stamps_hint(const CameraStatus& camera) {
         in_us(off), off.ns / 1000);
 }
 
+/// By one camera's exposure line, which says the same of all of them.
+std::string contradicted_hint(const Status& all) {
+    const auto camera =
+        std::find_if(all.cameras.begin(), all.cameras.end(),
+                     [&](const CameraStatus& it) { return it.name == all.ptp->contradicted; });
+    const auto error = camera != all.cameras.end() && camera->pipeline.strobe
+                           ? camera->pipeline.strobe->error.value_or(Duration{})
+                           : Duration{};
+    return fmt::format(
+        "the board saw the exposures of {} begin {} {} than its clock says: all frames by PTP are "
+        "withheld; is its line the exposure, and 'strobe_rising_us' right? else PTP's master or "
+        "the board's clock is wrong",
+        all.ptp->contradicted, in_us(absolute(error)), error.ns > 0 ? "earlier" : "later");
+}
+
 bool telling(std::uint64_t part, std::uint64_t whole) {
     return part >= 2 && static_cast<double>(part) > telling_part * static_cast<double>(whole);
 }
@@ -108,6 +123,7 @@ PtpFinding diagnose_ptp(const CameraStatus& camera, const Status& all) {
     if (!clock->status.follows()) return {Fault::ptp_lost, port_hint(*clock)};
     if (clock->agreement == clock::Agreement::differs)
         return {Fault::ptp_other_time, other_time_hint(*clock, *all.ptp)};
+    if (!all.ptp->contradicted.empty()) return {Fault::ptp_contradicted, contradicted_hint(all)};
     const PipelineReport& recent = camera.recent;
     if (telling(recent.actions_refused, recent.triggers))
         return {Fault::ptp_refused, refusal_hint(camera.pipeline.refusal)};

@@ -162,6 +162,14 @@ const char* to_string(TriggerSource trigger) {
 
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
+/// Null: the board does not see its exposures.
+json strobe_json(const std::optional<StrobeReport>& strobe) {
+    if (!strobe) return {};
+    return {{"compared", strobe->compared},
+            {"contradicting", strobe->contradicting},
+            {"error_ns", strobe->error ? json(strobe->error->ns) : json()}};
+}
+
 /// Null: it is not triggered by PTP time.
 json ptp_clock_json(const CameraStatus& status, const std::optional<PtpReport>& ptp) {
     if (!ptp || status.configuration.trigger != TriggerSource::ptp) return {};
@@ -179,7 +187,8 @@ json ptp_clock_json(const CameraStatus& status, const std::optional<PtpReport>& 
             {"readings_differing", found->differing},
             {"reading_width_ns", found->width.ns},
             {"start_delay_ns", status.pipeline.start_delay.ns},
-            {"actions_refused", status.pipeline.actions_refused}};
+            {"actions_refused", status.pipeline.actions_refused},
+            {"strobe", strobe_json(status.pipeline.strobe)}};
 }
 
 /// Null: no camera is triggered by PTP time.
@@ -191,7 +200,8 @@ json ptp_json(const std::optional<PtpReport>& ptp) {
             {"bound_ns", known ? json(ptp->bound.ns) : json()},
             {"steps", ptp->steps},
             {"minus_utc_ns", known ? json(ptp->minus_utc->ns) : json()},
-            {"master", text_or_null(ptp->master)}};
+            {"master", text_or_null(ptp->master)},
+            {"contradicted", text_or_null(ptp->contradicted)}};
 }
 
 json camera_json(const CameraStatus& status, const std::optional<PtpReport>& ptp) {

@@ -62,6 +62,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
     : name_(configuration.name),
       triggered_(configuration.trigger == TriggerSource::board),
       output_(configuration.output),
+      strobe_input_(configuration.strobe_input),
       index_(index),
       translator_(translator),
       events_(events),
@@ -79,6 +80,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       chunk_exposures_(configuration.slots),
       triggers_(configuration),
       by_ptp_(configuration, limits_of(configuration).frames_held),
+      strobe_(period_of(configuration), {}),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
 
@@ -95,6 +97,7 @@ void CameraPipeline::reconfigure(const CameraConfiguration& configuration) {
     answers_ = AnswerWatch(period_of(configuration));
     triggers_.expect(configuration);
     by_ptp_ = PtpFrames(configuration, limits_of(configuration).frames_held);
+    strobe_ = StrobeWitness(period_of(configuration), lines.start.sigma);
     const pairing::Limits before = std::exchange(limits_, limits_of(configuration));
     limits_.camera_clock = before.camera_clock && configuration.camera_clock;
     limits_.stamped = before.stamped;
@@ -349,8 +352,8 @@ void CameraPipeline::add(const CameraEvent& event) {
             if (!times_count) return;
             return event_lengths_.ended(event.block_id, event.at);
         case CameraEventKind::trigger_missed: return note_missed_trigger();
-        case CameraEventKind::ptp_lost: return note_ptp(true);
-        case CameraEventKind::ptp_locked: return note_ptp(false);
+        case CameraEventKind::ptp_lost: return note_ptp_event(true);
+        case CameraEventKind::ptp_locked: return note_ptp_event(false);
     }
 }
 
@@ -362,7 +365,7 @@ void CameraPipeline::note_missed_trigger() {
               "longer than the period");
 }
 
-void CameraPipeline::note_ptp(bool lost) {
+void CameraPipeline::note_ptp_event(bool lost) {
     if (std::exchange(report_.ptp_lost, lost) == lost) return;
     if (lost)
         log_later(LogLevel::warning, "the camera reports that its clock lost PTP");
@@ -411,6 +414,12 @@ void CameraPipeline::read_clock(const clock::ClockReading& reading) {
     settle_ptp();
 }
 
+void CameraPipeline::line_rose(BoardTime at) {
+    const std::lock_guard lock(mutex_);
+    const auto start = translator_.to_host(at - completion_.line_delays().start.delay);
+    if (start) strobe_.rose(*start);
+}
+
 bool CameraPipeline::wants_clock_reading() {
     const std::lock_guard lock(mutex_);
     return by_ptp_.waiting();
@@ -443,6 +452,10 @@ void CameraPipeline::settle_ptp() {
 }
 
 void CameraPipeline::publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure) {
+    if (const auto start = clocks_->to_host(exposure.start)) strobe_.started(*start);
+    clocks_->contradict(clock_, strobe_.contradicts());
+    if (clocks_->contradicted())
+        return frame_unpaired(arrival, EventReason::wrong_exposure, nullptr);
     const auto middle = clocks_->translate(exposure.middle());
     if (!middle) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
     if (!frames_.publish_by_ptp(arrival, exposure, *middle,
@@ -595,6 +608,7 @@ void CameraPipeline::set_line_delays(const LineDelays& lines) {
     report_.ptp_lost = false;
     completion_.set_line_delays(lines);
     check_.set_line_delays(lines);
+    strobe_ = StrobeWitness(period_of(configuration_), lines.start.sigma);
 }
 
 std::uint64_t CameraPipeline::newest_trigger() {
@@ -619,6 +633,8 @@ PipelineReport CameraPipeline::report() {
         report_.pairing = by_ptp_.proved() ? pairing::State::locked : pairing::State::searching;
         report_.stamp_instant = by_ptp_.stamped();
         report_.start_delay = by_ptp_.start_delay();
+        if (!configuration_.strobe_input.empty()) report_.strobe = strobe_.report();
+        report_.strobe_contradicts = strobe_.contradicts();
     }
     report_.lines = completion_.line_delays();
     report_.edges = check_.edges();

@@ -25,6 +25,7 @@
 #include "publish/frame_publisher.hpp"
 #include "settings/configuration.hpp"
 #include "start_watchdog.hpp"
+#include "strobe_witness.hpp"
 
 namespace versavis::daemon {
 
@@ -42,10 +43,12 @@ struct PipelineReport {
     std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
     Duration doubted_exposure;          ///< of the newest one, if its length was doubted; else 0
     std::uint64_t triggers_without_frame = 0;
-    std::uint64_t triggers_missed = 0;  ///< by the camera's own events
-    bool ptp_lost = false;              ///< the same
-    std::uint64_t actions_refused = 0;  ///< triggers by PTP time that the camera did not take ...
-    std::uint16_t refusal = 0;          ///< ... and the newest GVCP status of one; 0: none
+    std::uint64_t triggers_missed = 0;   ///< by the camera's own events
+    bool ptp_lost = false;               ///< the same
+    std::uint64_t actions_refused = 0;   ///< triggers by PTP time that the camera did not take ...
+    std::uint16_t refusal = 0;           ///< ... and the newest GVCP status of one; 0: none
+    std::optional<StrobeReport> strobe;  ///< none: the board does not see its exposures
+    bool strobe_contradicts = false;     ///< the board saw them elsewhere
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -132,6 +135,9 @@ class CameraPipeline final : private pairing::Outcome {
     void note_ptp(const PtpStatus& status);
     void read_clock(const clock::ClockReading& reading);
 
+    /// The exposure line of a camera that is triggered by PTP time became active.
+    void line_rose(BoardTime at);
+
     /// Frames wait until its clock is read. `told`: called when that begins, on any thread, while
     /// the pipeline is locked; none: nobody is.
     bool wants_clock_reading();
@@ -152,7 +158,8 @@ class CameraPipeline final : private pairing::Outcome {
     const std::string& name() const { return name_; }
     bool triggered() const { return triggered_; }  ///< by the board
     bool by_ptp() const { return clocks_ != nullptr; }
-    unsigned output() const { return output_; }  ///< of the board
+    const std::string& strobe_input() const { return strobe_input_; }  ///< empty: none
+    unsigned output() const { return output_; }                        ///< of the board
     std::uint8_t board_mask() const { return static_cast<std::uint8_t>(1U << output_); }
 
     /// Number of the newest trigger that the board recorded.
@@ -191,7 +198,7 @@ class CameraPipeline final : private pairing::Outcome {
     pairing::Arrival completed(pairing::Arrival arrival) const;
     void note_chunk_lag();
     void note_missed_trigger();
-    void note_ptp(bool lost);
+    void note_ptp_event(bool lost);
     void add_by_ptp(const pairing::Arrival& arrival);
     void settle_ptp();
     void publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure);
@@ -206,6 +213,7 @@ class CameraPipeline final : private pairing::Outcome {
     const std::string name_;
     const bool triggered_;
     const unsigned output_;
+    const std::string strobe_input_;
     const std::uint32_t index_;
     clock::Translator& translator_;
     EventJournal& events_;
@@ -230,6 +238,7 @@ class CameraPipeline final : private pairing::Outcome {
     std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
     StartWatchdog triggers_;
     PtpFrames by_ptp_;
+    StrobeWitness strobe_;
     PtpStatus ptp_status_;
     std::string port_logged_;
     std::function<void()> reading_wanted_;

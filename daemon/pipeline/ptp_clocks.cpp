@@ -20,6 +20,7 @@ std::size_t PtpClocks::add(const std::string& name) {
 void PtpClocks::note(std::size_t clock, const PtpStatus& status) {
     const std::lock_guard lock(mutex_);
     clocks_[clock].status = status;
+    if (status.state.empty()) clocks_[clock].contradicted = false;
     if (status.follows()) return;
     clocks_[clock].agreement = Agreement::unknown;
     timescale_.forget(clock);
@@ -48,6 +49,17 @@ std::string PtpClocks::master() const {
     const auto found = std::find_if(clocks_.begin(), clocks_.end(),
                                     [](const auto& clock) { return clock.status.is_master(); });
     return found == clocks_.end() ? "" : found->name;
+}
+
+void PtpClocks::contradict(std::size_t clock, bool contradicted) {
+    const std::lock_guard lock(mutex_);
+    clocks_[clock].contradicted = contradicted;
+}
+
+bool PtpClocks::contradicted() const {
+    const std::lock_guard lock(mutex_);
+    return std::any_of(clocks_.begin(), clocks_.end(),
+                       [](const PtpClockReport& clock) { return clock.contradicted; });
 }
 
 bool PtpClocks::ready(std::size_t clock) const {
@@ -83,6 +95,8 @@ PtpReport PtpClocks::report() {
     const std::lock_guard lock(mutex_);
     report.clocks = clocks_;
     report.master = master();
+    for (const PtpClockReport& clock : clocks_)
+        if (clock.contradicted) report.contradicted = clock.name;
     report.steps = timescale_.steps();
     const auto ptp = timescale_.at(now);
     if (!ptp) return report;

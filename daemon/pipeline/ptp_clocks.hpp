@@ -32,7 +32,8 @@ struct PtpClockReport {
     clock::Agreement agreement = clock::Agreement::unknown;  ///< of the newest that could tell
     std::uint64_t readings = 0;
     std::uint64_t differing = 0;
-    Duration width;  ///< of the newest reading
+    Duration width;             ///< of the newest reading
+    bool contradicted = false;  ///< by the board
 };
 
 /// PTP's time as all readings have it.
@@ -41,7 +42,8 @@ struct PtpReport {
     Duration sigma;
     Duration bound;
     std::uint64_t steps = 0;
-    std::string master;  ///< a camera that is one, and should not; empty: none
+    std::string master;        ///< a camera that is one, and should not; empty: none
+    std::string contradicted;  ///< a camera whose exposures the board saw elsewhere; empty: none
     /// PTP's time less UTC of this host: 37 s for TAI, as PTP wants it; none: not known yet.
     std::optional<Duration> minus_utc;
     std::vector<PtpClockReport> clocks;
@@ -60,6 +62,11 @@ class PtpClocks {
 
     /// Returns `differs`, too, while the camera does not follow PTP.
     clock::Agreement read(std::size_t clock, const clock::ClockReading& reading);
+
+    /// The board saw this camera's exposures elsewhere than its clock says. Then PTP's time or the
+    /// board's is wrong, and so may be the stamps of all cameras.
+    void contradict(std::size_t clock, bool contradicted);
+    bool contradicted() const;
 
     /// It can be triggered: it follows PTP and shows its time, and no camera is a master.
     bool ready(std::size_t clock) const;

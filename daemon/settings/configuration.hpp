@@ -87,6 +87,7 @@ struct CameraConfiguration {
     double pulse_us = 100;
     bool trigger_inverted = false;
     Strobe strobe = Strobe::active_high;
+    std::string strobe_input;  ///< of pulse_input_names, for one that is triggered by PTP
     std::string preset = "auto";
     std::string trigger_line;  ///< empty: as in the preset
     std::string strobe_line;   ///< empty: as in the preset

@@ -266,14 +266,51 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
     }
 }
 
+/// The board sees the edge at which the exposure begins.
+void check_strobe_input(const Configuration& configuration, const CameraConfiguration& camera,
+                        Findings& findings) {
+    const std::string& input = camera.strobe_input;
+    if (input.empty()) return;
+    const PortConfiguration& ports = configuration.ports;
+    const bool falls = camera.strobe == Strobe::active_low;
+    if (input != "aux0" && input != "aux1")
+        findings.add(camera.entry, "strobe_input",
+                     fmt::format("'{}' is no auxiliary input", clipped(input)),
+                     "use \"aux0\" or \"aux1\"");
+    else if (!contains(ports.inputs, input))
+        findings.add(camera.entry, "strobe_input",
+                     fmt::format("the input '{}' is not enabled", input),
+                     "add it to 'inputs' of [ports]");
+    else if (contains(ports.falling, input) != falls)
+        findings.add(camera.entry, "strobe_input",
+                     fmt::format("the exposure begins with the other edge of '{}'", input),
+                     falls ? "add it to 'falling' of [ports]"
+                           : "remove it from 'falling' of [ports], or set strobe = \"active_low\"");
+    if (camera.strobe == Strobe::none)
+        findings.add(camera.entry, "strobe_input", "'strobe' says that there is no exposure line",
+                     "remove one of the two");
+    for (const CameraConfiguration& other : configuration.cameras)
+        if (&other != &camera && other.strobe_input == input)
+            findings.add(camera.entry, "strobe_input",
+                         fmt::format("'{}' is already used by {}", input, other.name),
+                         "each line needs an input of its own");
+}
+
 /// Their frames are proved by the camera's clock and by exposures of a known length.
 void check_ptp(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras) {
-        if (camera.trigger != TriggerSource::ptp) continue;
+        if (camera.trigger != TriggerSource::ptp) {
+            if (!camera.strobe_input.empty())
+                findings.add(camera.entry, "strobe_input",
+                             "'strobe_input' is for cameras with trigger = \"ptp\"",
+                             "remove it: the exposure line belongs to the input of 'output'");
+            continue;
+        }
         if (!camera.camera_clock)
             findings.add(camera.entry, "camera_clock",
                          "with trigger = \"ptp\" frames are stamped by the camera's clock",
                          "remove 'camera_clock', or trigger the camera by the board");
+        check_strobe_input(configuration, camera, findings);
         if (camera.exposure_by_pulse)
             findings.add(camera.entry, "exposure",
                          "with trigger = \"ptp\" there is no trigger pulse that sets the exposure",

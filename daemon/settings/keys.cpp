@@ -319,6 +319,8 @@ Keys<CameraConfiguration> trigger_keys() {
          "the camera's trigger input, as in TriggerSource"},
         {"strobe_line", plain(&Camera::strobe_line, "text").usually("by preset"),
          "the camera's exposure output, as in LineSelector"},
+        {"strobe_input", plain(&Camera::strobe_input, "aux0, aux1").usually(""),
+         "for `trigger = \"ptp\"`: input of the board for its line"},
         {"strobe_rising_us",
          numbers(&Camera::strobe_rising_us, 2, "[value, sigma], ", slowest_edge_us)
              .usually("by preset"),

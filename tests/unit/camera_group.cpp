@@ -94,5 +94,5 @@ TEST_CASE("camera_group: streams are named after the cameras") {
     for (const StreamStatus& stream : bench.group.streams()) names.push_back(stream.name);
     CHECK(names ==
           std::vector<std::string>{"left", "left-evidence", "free", "right", "right-evidence"});
-    CHECK(bench.group.any_triggered());
+    CHECK(bench.group.any_needs_board());
 }

@@ -503,6 +503,28 @@ TEST_CASE("doctor: the conclusion is right only with proof, and says which") {
     CHECK(with("/cameras/0/trigger", "free").state == State::unknown);
     CHECK(with("/cameras/0/frames_published", 0).state == State::unknown);
     CHECK(with("/cameras", json::array()).state == State::unknown);
+
+    // Cameras by PTP, with a board and without.
+    const json ptp{{"state", "locked"}, {"sigma_ns", 3000}, {"bound_ns", 20000}};
+    const auto by_ptp = [&](const json& time, const char* board) {
+        host.subject.status = proved_status();
+        json& status = *host.subject.status;
+        status["ptp"] = time;
+        status["board"]["state"] = board;
+        if (std::string_view(board) == "unused") status["clock"]["state"] = "init";
+        status["cameras"][0]["trigger"] = "ptp";
+        status["cameras"][0]["exposure_ns"] = 0;
+        return conclude(host.subject);
+    };
+    CHECK(by_ptp(ptp, "running").state == State::right);
+    CHECK(by_ptp(ptp, "unused").state == State::right);
+    CHECK_THAT(
+        by_ptp(ptp, "unused").sentence,
+        Contains(
+            "sigma is 3.0 us, the bound 20.0 us; frames of 1 camera are stamped by its own clock"));
+    CHECK(by_ptp({{"state", "init"}, {"sigma_ns", nullptr}}, "unused").state == State::unknown);
+    CHECK(by_ptp({{"state", "init"}, {"sigma_ns", nullptr}}, "running").state == State::unknown);
+    CHECK(by_ptp(nullptr, "unused").state == State::unknown);
 }
 
 TEST_CASE("doctor: the report is one line for each finding, and one object as JSON") {

@@ -88,6 +88,15 @@ TEST_CASE("ptp_diagnosis: another time is explained by another grandmaster, if t
     bench.check(Fault::ptp_other_time, "00b2 instead of 00a1");
 }
 
+TEST_CASE("ptp_diagnosis: the board's word is about all cameras") {
+    PtpCameras bench;
+    bench.status.ptp->contradicted = "cam1";
+    bench.status.cameras[1].pipeline.strobe = StrobeReport{9, 3, milliseconds(2)};
+    bench.check(Fault::ptp_contradicted, "exposures of cam1 begin 2000 us earlier");
+    bench.status.cameras[1].pipeline.strobe->error = milliseconds(-2);
+    bench.check(Fault::ptp_contradicted, "2000 us later");
+}
+
 TEST_CASE("ptp_diagnosis: refused actions, by what the camera answers") {
     PtpCameras bench;
     bench.status.cameras[0].recent.actions_refused = 3;

@@ -194,10 +194,10 @@ std::vector<PtpAnswer> parse_pmc(const std::string& text) {
 }
 
 Expected<std::vector<PtpAnswer>> ask_ptp4l() {
-    auto pmc =
-        ChildProcess::start({"pmc", "-u", "-b", "0", "GET DEFAULT_DATA_SET", "GET PORT_DATA_SET",
-                             "GET PARENT_DATA_SET", "GET TIME_PROPERTIES_DATA_SET"},
-                            ChildProcess::Errors::dropped);
+    auto pmc = ChildProcess::start(
+        {"pmc", "-u", "-b", "0", "GET DEFAULT_DATA_SET", "GET PORT_DATA_SET", "GET PARENT_DATA_SET",
+         "GET TIME_PROPERTIES_DATA_SET", "GET CURRENT_DATA_SET"},
+        ChildProcess::Errors::dropped);
     if (!pmc) return Unexpected(pmc.error());
     std::string text;
     std::array<char, 4096> piece{};

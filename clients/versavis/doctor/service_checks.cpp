@@ -179,6 +179,7 @@ struct Proof {
     std::size_t cameras = 0;   ///< triggered
     std::size_t measured = 0;  ///< of them, whose exposures are measured by their line
     std::size_t agreeing = 0;  ///< of those, whose own account of the exposure agrees
+    std::size_t by_ptp = 0;    ///< of all, who stamp by PTP's time
     std::string missing;       ///< the first camera without proof, and why
 };
 
@@ -194,10 +195,12 @@ Proof proof_of(const json& status) {
             if (proof.missing.empty()) proof.missing = name + " is stopped by request";
             continue;
         }
-        if (camera.value("trigger", "") != "board") {
-            if (proof.missing.empty()) proof.missing = name + " is not triggered by the board";
+        const std::string trigger = camera.value("trigger", "");
+        if (trigger != "board" && trigger != "ptp") {
+            if (proof.missing.empty()) proof.missing = name + " runs freely, without triggers";
             continue;
         }
+        if (trigger == "ptp") ++proof.by_ptp;
         const auto published = camera.value("frames_published", std::uint64_t{0});
         const auto suspect = camera.value("frames_suspect", std::uint64_t{0});
         ++proof.cameras;
@@ -226,6 +229,10 @@ std::string witnesses(const json& status, const Proof& proof) {
         text += fmt::format("; the exposures of {} of {} are measured by their line",
                             proof.measured, counted(proof.cameras));
     if (proof.agreeing > 0) text += fmt::format(", {} report the same", proof.agreeing);
+    if (proof.by_ptp > 0)
+        text +=
+            fmt::format("; frames of {} are stamped by its own clock, which agrees with PTP's time",
+                        counted(proof.by_ptp));
     if (status.value("board", json::object()).value("stamp_test", "") == "passed")
         text += "; the board's test of its stamps passes";
     if (status.value("clock", json::object()).value("pps", "") == "used")
@@ -282,11 +289,15 @@ Conclusion conclude(const json& status) {
     if (!degraded.empty()) return because(State::wrong, degraded);
     const std::string starting = first_cause(status, "starting");
     if (!starting.empty()) return because(State::unknown, starting);
-    const json clock = status.value("clock", json::object());
+    // A board that is not used has no clock; the cameras' own then make the stamps.
+    const bool has_board = status.value("board", json::object()).value("state", "") != "unused";
+    const json ptp = status.value("ptp", json());
+    const json clock = has_board || !ptp.is_object() ? status.value("clock", json::object()) : ptp;
     const json sigma = clock.value("sigma_ns", json());
-    if (clock.value("state", "") != "locked" || !sigma.is_number())
-        return because(State::unknown,
-                       fmt::format("the clock is '{}'", clock.value("state", "unknown")));
+    for (const json& used : {clock, ptp.is_object() ? ptp : clock})
+        if (used.value("state", "") != "locked" || !sigma.is_number())
+            return because(State::unknown,
+                           fmt::format("the clock is '{}'", used.value("state", "unknown")));
     const Proof proof = proof_of(status);
     if (!proof.missing.empty()) return because(State::unknown, proof.missing);
     if (proof.cameras == 0)
