@@ -124,6 +124,7 @@ std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostT
 }
 
 void CameraGroup::auxiliary_pulse(unsigned input, BoardTime at) {
+    if (input > 1) return;  // the board has no such
     const std::string& name = pulse_input_names[wire::pulse_aux0 + input];
     for (const Unit& unit : units_)
         if (unit.pipeline->strobe_input() == name) unit.pipeline->line_rose(at);

@@ -493,9 +493,12 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     streaming_ = true;
     settle_change("");
     hooks_.streaming();
-    auto ended = [&] {
+    auto ended = [&]() -> CameraResult<> {
         const auto trigger =
             ptp ? ActionTrigger::create(device_->interface, device_->address, pipeline_) : nullptr;
+        if (ptp && trigger == nullptr)
+            return failed({configuration_.name, "there is no socket for its triggers",
+                           "raise the limit of open files (LimitNOFILE)"});
         return watch(camera, nodes, **frames, ptp ? &*ptp : nullptr, control_lost);
     }();
     lose();

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "camera/gvcp.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -46,6 +48,10 @@ Expected<PtpReader> PtpReader::create(AravisNodeMap& nodes, const std::string& c
         return failure(camera, fmt::format("the camera has no {}", what),
                        "trigger = \"ptp\" needs it: trigger this camera by the board");
     };
+    GlibError error;
+    reader.ticks_per_second_ =
+        arv_gv_device_get_timestamp_tick_frequency(ARV_GV_DEVICE(nodes.device()), error.out());
+    if (error.set() || reader.ticks_per_second_ == 0) return lacks("clock of a known frequency");
     if (reader.state_.empty()) return lacks("PtpStatus or GevIEEE1588Status");
     if (reader.latch_.empty() || reader.latched_.empty())
         return lacks("TimestampLatch or GevTimestampControlLatch");
@@ -59,11 +65,10 @@ std::optional<PtpStatus> PtpReader::status() {
     if (status.state.empty()) return std::nullopt;
     if (!servo_.empty()) status.servo_locked = nodes_->read(servo_) == "Locked";
     // Registers of 32 bits without a sign are read as large numbers.
-    if (const auto ns = nodes_->read_number(offset_))
-        status.offset =
-            Duration{*ns > INT32_MAX
-                         ? static_cast<std::int32_t>(static_cast<std::uint32_t>(std::llround(*ns)))
-                         : std::llround(*ns)};
+    if (const auto ns = offset_.empty() ? std::nullopt : integer(nodes_->device(), offset_)) {
+        const bool unsigned_32 = *ns > INT32_MAX && *ns <= UINT32_MAX;
+        status.offset = Duration{unsigned_32 ? static_cast<std::int32_t>(*ns) : *ns};
+    }
     if (grandmaster_.empty()) return status;
     if (const auto id = integer(nodes_->device(), grandmaster_))  // a double has too few bits
         status.grandmaster = fmt::format("{:016x}", static_cast<std::uint64_t>(*id));
@@ -77,7 +82,7 @@ std::optional<clock::ClockReading> PtpReader::clock() {
     reading.after = host_now();
     const auto shown = integer(nodes_->device(), latched_);
     if (!shown || *shown <= 0) return std::nullopt;
-    reading.shown.ns = *shown;
+    reading.shown = camera_time(static_cast<std::uint64_t>(*shown), ticks_per_second_);
     return reading;
 }
 

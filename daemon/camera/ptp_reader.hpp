@@ -25,6 +25,7 @@ class PtpReader {
     explicit PtpReader(AravisNodeMap& nodes) : nodes_(&nodes) {}
 
     AravisNodeMap* nodes_;
+    std::uint64_t ticks_per_second_ = 0;
     std::string state_;
     std::string latch_data_;  ///< empty: the state needs no command
     std::string servo_;       ///< empty: it does not say

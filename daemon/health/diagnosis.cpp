@@ -63,6 +63,7 @@ struct CameraView {
     const Status& all;
 
     bool triggered() const { return it.triggered(); }
+    bool has_triggers() const { return it.configuration.trigger != TriggerSource::free_run; }
     bool streaming() const { return it.camera.state == CameraState::streaming; }
     bool in(CameraState state) const { return it.camera.state == state; }
     bool full() const { return it.delivery.full; }
@@ -309,10 +310,11 @@ std::string clock_hint(const CameraView& camera) {
 }
 
 bool frames_missing(const CameraView& camera) {
-    const std::uint64_t unmeasured = camera.strobe() ? camera.it.recent.unmeasured : 0;
+    const std::uint64_t unmeasured =
+        camera.triggered() && camera.strobe() ? camera.it.recent.unmeasured : 0;
     const std::uint64_t exposed = camera.it.recent.triggers - unmeasured;
     const std::uint64_t arrived = camera.frames() + camera.on_link();
-    return camera.triggered() && !camera.full() && exposed > arrived &&
+    return camera.has_triggers() && !camera.full() && exposed > arrived &&
            some(exposed - arrived, exposed);
 }
 
@@ -323,6 +325,11 @@ bool all_frames_missing(const CameraView& camera) {
 std::string missing_hint(const CameraView& camera) {
     const std::uint64_t triggers = camera.it.recent.triggers;
     const std::uint64_t missing = triggers - std::min(camera.frames(), triggers);
+    if (!camera.triggered())
+        return fmt::format(
+            "{} of the last {} triggers sent by network have no frame here: check network and "
+            "firewall, for commands to UDP port 3956 and for frames",
+            missing, triggers);
     if (!camera.strobe())
         return fmt::format(
             "{} of the last {} triggers have no frame here, and without an exposure line nothing "
@@ -338,7 +345,7 @@ std::string missing_hint(const CameraView& camera) {
 bool answers_some(const CameraView& camera) {
     const std::uint64_t asked = camera.it.recent.triggers;
     const std::uint64_t answered = camera.frames() + camera.on_link();
-    const bool free = !camera.triggered() && camera.frames() > 0;
+    const bool free = !camera.has_triggers() && camera.frames() > 0;
     return !camera.full() &&
            (free || (asked > answered && camera.frames() > 0 && some(asked - answered, asked)));
 }
@@ -479,6 +486,7 @@ constexpr Rule camera_rules[] = {
     {Fault::ptp_lost, by_ptp<Fault::ptp_lost>, ptp_hint},
     {Fault::ptp_other_time, by_ptp<Fault::ptp_other_time>, ptp_hint},
     {Fault::ptp_contradicted, by_ptp<Fault::ptp_contradicted>, ptp_hint},
+    {Fault::ptp_unread, by_ptp<Fault::ptp_unread>, ptp_hint},
     {Fault::ptp_refused, by_ptp<Fault::ptp_refused>, ptp_hint},
     {Fault::ptp_stamps, by_ptp<Fault::ptp_stamps>, ptp_hint},
     {Fault::link_full,
@@ -615,6 +623,7 @@ constexpr Rule camera_rules[] = {
     {Fault::block_ids, ids_fail, ids_hint},
     {Fault::triggers_ignored, ignores_triggers, ignored_hint},
     {Fault::unproved, not_followed, unproved_hint},
+    {Fault::unproved, by_ptp<Fault::unproved>, ptp_hint},
     {Fault::rate_too_high,
      [](const CameraView& c) {
          return answers_some(c) && (!c.strobe() || !c.triggered() || !frames_missing(c));
@@ -733,6 +742,7 @@ const char* to_string(Fault fault) {
         case Fault::ptp_master: return "ptp_master";
         case Fault::ptp_lost: return "ptp_lost";
         case Fault::ptp_other_time: return "ptp_other_time";
+        case Fault::ptp_unread: return "ptp_unread";
         case Fault::ptp_refused: return "ptp_refused";
         case Fault::ptp_stamps: return "ptp_stamps";
         case Fault::ptp_contradicted: return "ptp_contradicted";

@@ -71,6 +71,7 @@ enum class Fault {
     ptp_master,
     ptp_lost,
     ptp_other_time,
+    ptp_unread,
     ptp_refused,
     ptp_stamps,
     ptp_contradicted,

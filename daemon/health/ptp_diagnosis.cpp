@@ -32,6 +32,10 @@ std::string port_hint(const PtpClockReport& clock) {
     if (state == "Uncalibrated") return "its clock begins to follow a PTP master";
     if (state == "Disabled" || state == "Faulty")
         return fmt::format("its PTP port is {}: restart the camera, or power it off and on", state);
+    if (state == "Passive")
+        return "its PTP port is Passive: it hears a better master on another port, or competes "
+               "with "
+               "it; set it to slave only";
     return fmt::format(
         "its PTP port is {}: it hears no master; start ptp4l on the interface of this camera, and "
         "check that switches pass PTP (UDP ports 319 and 320)",
@@ -52,6 +56,16 @@ std::string other_time_hint(const PtpClockReport& clock, const PtpReport& ptp) {
            "a second PTP master, or did the master's time step?";
 }
 
+/// Enough for an estimate of PTP's time to begin.
+constexpr std::uint64_t few_readings = 20;
+
+std::string unread_hint(const PtpClockReport& clock) {
+    return fmt::format(
+        "readings of its clock take {}, too long to tell what it shows, or differ from each other: "
+        "lower the load of host and network, and check that all cameras have one PTP master",
+        in_us(clock.width));
+}
+
 std::string refusal_hint(std::uint16_t status) {
     switch (status) {
         case no_reference_time:
@@ -68,25 +82,68 @@ std::string refusal_hint(std::uint16_t status) {
     }
 }
 
+bool telling(std::uint64_t part, std::uint64_t whole) {
+    return part >= 2 && static_cast<double>(part) > telling_part * static_cast<double>(whole);
+}
+
+/// From the start of the exposure, as the stamp is taken for.
+Duration taken_for(pairing::Instant instant, Duration exposure) {
+    switch (instant) {
+        case pairing::Instant::middle: return exposure / 2;
+        case pairing::Instant::end: return exposure;
+        default: return {};
+    }
+}
+
 /// Its frames' stamps are none that its triggers make.
 std::string stamps_hint(const CameraStatus& camera) {
     const Duration off = camera.pipeline.start_delay;
-    const Duration exposure = camera.pipeline.commanded_exposure;
     if (absolute(off) > period_of(camera.configuration))
         return fmt::format(
             "its frames are stamped {:.3f} s off what its own clock shows: they are of another "
             "clock, which PTP does not steer; update its firmware, or trigger it by the board",
             static_cast<double>(off.ns) * 1e-9);
-    for (const auto& [part, instant] : {std::pair{exposure, "end"}, {exposure / 2, "middle"}})
-        if (exposure.ns != 0 && absolute(off - part) < nearly)
+    const Duration exposure = camera.pipeline.commanded_exposure;
+    const Duration latency = from_us(camera.configuration.latency_us);
+    const Duration after = off + latency + taken_for(camera.pipeline.stamp_instant, exposure);
+    const std::string said =
+        fmt::format("its frames are stamped {} after the trigger", in_us(after));
+    for (const auto& [instant, name] : {std::pair{pairing::Instant::end, "end"},
+                                        {pairing::Instant::middle, "middle"},
+                                        {pairing::Instant::start, "start"}})
+        if (exposure.ns != 0 && instant != camera.pipeline.stamp_instant &&
+            absolute(after - latency - taken_for(instant, exposure)) < nearly)
             return fmt::format(
-                "its frames are stamped {} after the trigger: is that the {} of the exposure? then "
-                "set stamp_instant = \"{}\"; if it is its latency, set latency_us = {}",
-                in_us(off), instant, instant, off.ns / 1000);
-    return fmt::format(
-        "its frames are stamped {} after the trigger: if that is the camera's latency, set "
-        "latency_us = {}",
-        in_us(off), off.ns / 1000);
+                "{}: is that the {} of the exposure? then set stamp_instant = \"{}\"", said, name,
+                name);
+    if (after - taken_for(camera.pipeline.stamp_instant, exposure) < Duration{})
+        return said + ", before it could expose: is stamp_instant right?";
+    return fmt::format("{}: if that is the camera's latency, set latency_us = {}", said,
+                       (after - taken_for(camera.pipeline.stamp_instant, exposure)).ns / 1000);
+}
+
+/// Why most of the frames are refused; empty: none of these.
+std::string refused_hint(const PipelineReport& recent) {
+    constexpr std::pair<EventReason, const char*> causes[]{
+        {EventReason::no_clock,
+         "its clock could not be confirmed in time: lower the load of host "
+         "and network"},
+        {EventReason::too_old,
+         "they arrive too late: lower the load of the network, or raise "
+         "'latest_arrival_ms'"},
+        {EventReason::not_yet,
+         "they arrive before their exposure ends, by their own account: is "
+         "stamp_instant right?"},
+        {EventReason::wrong_exposure,
+         "the exposure that they carry is not the one that was set: "
+         "check ExposureTime, or set chunks = false"}};
+    for (const auto& [reason, why] : causes) {
+        const std::uint64_t refused = recent.refused[static_cast<std::size_t>(reason)];
+        if (telling(refused, recent.received))
+            return fmt::format("{} of the last {} frames are withheld: {}", refused,
+                               recent.received, why);
+    }
+    return "";
 }
 
 /// By one camera's exposure line, which says the same of all of them.
@@ -104,10 +161,6 @@ std::string contradicted_hint(const Status& all) {
         all.ptp->contradicted, in_us(absolute(error)), error.ns > 0 ? "earlier" : "later");
 }
 
-bool telling(std::uint64_t part, std::uint64_t whole) {
-    return part >= 2 && static_cast<double>(part) > telling_part * static_cast<double>(whole);
-}
-
 }  // namespace
 
 PtpFinding diagnose_ptp(const CameraStatus& camera, const Status& all) {
@@ -123,13 +176,16 @@ PtpFinding diagnose_ptp(const CameraStatus& camera, const Status& all) {
     if (!clock->status.follows()) return {Fault::ptp_lost, port_hint(*clock)};
     if (clock->agreement == clock::Agreement::differs)
         return {Fault::ptp_other_time, other_time_hint(*clock, *all.ptp)};
+    if (clock->agreement == clock::Agreement::unknown && clock->readings > few_readings)
+        return {Fault::ptp_unread, unread_hint(*clock)};
     if (!all.ptp->contradicted.empty()) return {Fault::ptp_contradicted, contradicted_hint(all)};
     const PipelineReport& recent = camera.recent;
     if (telling(recent.actions_refused, recent.triggers))
         return {Fault::ptp_refused, refusal_hint(camera.pipeline.refusal)};
     const std::uint64_t misfits = recent.refused[static_cast<std::size_t>(EventReason::mismatch)];
     if (telling(misfits, recent.received)) return {Fault::ptp_stamps, stamps_hint(camera)};
-    return {};
+    const std::string refused = refused_hint(recent);
+    return refused.empty() ? PtpFinding{} : PtpFinding{Fault::unproved, refused};
 }
 
 }  // namespace versavis::daemon

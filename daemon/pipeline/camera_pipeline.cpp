@@ -96,7 +96,8 @@ void CameraPipeline::reconfigure(const CameraConfiguration& configuration) {
     check_.set_line_delays(lines);
     answers_ = AnswerWatch(period_of(configuration));
     triggers_.expect(configuration);
-    by_ptp_ = PtpFrames(configuration, limits_of(configuration).frames_held);
+    by_ptp_.reconfigure(configuration);
+    settle_ptp();
     strobe_ = StrobeWitness(period_of(configuration), lines.start.sigma);
     const pairing::Limits before = std::exchange(limits_, limits_of(configuration));
     limits_.camera_clock = before.camera_clock && configuration.camera_clock;
@@ -409,7 +410,10 @@ void CameraPipeline::note_ptp(const PtpStatus& status) {
 
 void CameraPipeline::read_clock(const clock::ClockReading& reading) {
     const clock::Agreement agreement = clocks_->read(clock_, reading);
+    const std::uint64_t steps = clocks_->steps();
     const std::lock_guard lock(mutex_);
+    // Another camera may have found that PTP's time stepped.
+    if (std::exchange(ptp_steps_, steps) != steps) by_ptp_.lose_clock();
     by_ptp_.read_clock(reading, agreement);
     settle_ptp();
 }
@@ -426,9 +430,9 @@ bool CameraPipeline::wants_clock_reading() {
 }
 
 void CameraPipeline::add_by_ptp(const pairing::Arrival& arrival) {
-    const Duration event = event_lengths_.length(arrival.block_id);
-    by_ptp_.add(arrival, event.ns != 0 ? event : arrival.exposure,
-                clocks_->to_host(arrival.camera_time));
+    const PtpFrames::Account length{event_lengths_.length(arrival.block_id), arrival.exposure};
+    report_.length_by_frame = length.event.ns != 0 || length.chunk.ns != 0;
+    by_ptp_.add(arrival, length, clocks_->to_host(arrival.camera_time));
     settle_ptp();
     if (by_ptp_.waiting() && reading_wanted_) reading_wanted_();
 }
@@ -452,10 +456,14 @@ void CameraPipeline::settle_ptp() {
 }
 
 void CameraPipeline::publish_by_ptp(const pairing::Arrival& arrival, const PtpExposure& exposure) {
-    if (const auto start = clocks_->to_host(exposure.start)) strobe_.started(*start);
-    clocks_->contradict(clock_, strobe_.contradicts());
-    if (clocks_->contradicted())
-        return frame_unpaired(arrival, EventReason::wrong_exposure, nullptr);
+    const Duration offset = ptp_status_.offset.value_or(Duration{});
+    if (auto start = clocks_->to_host(exposure.start)) {
+        start->bound = start->bound + rounded(clock::bound_sigmas *
+                                              std::hypot(exposure.start_sigma.ns, offset.ns));
+        strobe_.started(*start);
+    }
+    clocks_->contradict(clock_, strobe_.contradicts(arrival.arrived));
+    if (clocks_->distrusted()) return frame_unpaired(arrival, EventReason::wrong_exposure, nullptr);
     const auto middle = clocks_->translate(exposure.middle());
     if (!middle) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
     if (!frames_.publish_by_ptp(arrival, exposure, *middle,
@@ -554,6 +562,7 @@ std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
 std::optional<pairing::Start> CameraPipeline::advance_locked(HostTime now) {
     frames_.heartbeat(now);
     if (by_ptp()) {
+        clocks_->contradict(clock_, strobe_.contradicts(now));
         by_ptp_.advance(now);
         settle_ptp();
     }
@@ -592,12 +601,12 @@ void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
 void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
     const std::lock_guard lock(mutex_);
     check_.read_exposure(exposure, at, report_.start_delay);
-    by_ptp_.set_exposure(exposure, at);
+    by_ptp_.read_exposure(exposure, at);
 }
 
 bool CameraPipeline::wants_exposure_readings() {
     const std::lock_guard lock(mutex_);
-    if (by_ptp()) return report_.commanded_exposure.ns == 0;
+    if (by_ptp()) return !report_.length_by_frame;
     return triggered() && check_.wants_readings();
 }
 
@@ -634,7 +643,6 @@ PipelineReport CameraPipeline::report() {
         report_.stamp_instant = by_ptp_.stamped();
         report_.start_delay = by_ptp_.start_delay();
         if (!configuration_.strobe_input.empty()) report_.strobe = strobe_.report();
-        report_.strobe_contradicts = strobe_.contradicts();
     }
     report_.lines = completion_.line_delays();
     report_.edges = check_.edges();

@@ -48,7 +48,7 @@ struct PipelineReport {
     std::uint64_t actions_refused = 0;   ///< triggers by PTP time that the camera did not take ...
     std::uint16_t refusal = 0;           ///< ... and the newest GVCP status of one; 0: none
     std::optional<StrobeReport> strobe;  ///< none: the board does not see its exposures
-    bool strobe_contradicts = false;     ///< the board saw them elsewhere
+    bool length_by_frame = false;        ///< the newest frame said how long it was exposed
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -241,6 +241,7 @@ class CameraPipeline final : private pairing::Outcome {
     StrobeWitness strobe_;
     PtpStatus ptp_status_;
     std::string port_logged_;
+    std::uint64_t ptp_steps_ = 0;
     std::function<void()> reading_wanted_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;

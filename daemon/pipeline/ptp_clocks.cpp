@@ -56,10 +56,22 @@ void PtpClocks::contradict(std::size_t clock, bool contradicted) {
     clocks_[clock].contradicted = contradicted;
 }
 
-bool PtpClocks::contradicted() const {
+/// Of one that lost PTP, or shows another time, the board's word is about that.
+std::string PtpClocks::contradicted() const {
+    const auto found = std::find_if(clocks_.begin(), clocks_.end(), [](const auto& clock) {
+        return clock.contradicted && clock.status.follows() && clock.agreement == Agreement::agrees;
+    });
+    return found == clocks_.end() ? "" : found->name;
+}
+
+bool PtpClocks::distrusted() const {
     const std::lock_guard lock(mutex_);
-    return std::any_of(clocks_.begin(), clocks_.end(),
-                       [](const PtpClockReport& clock) { return clock.contradicted; });
+    return !contradicted().empty() || !master().empty();
+}
+
+std::uint64_t PtpClocks::steps() const {
+    const std::lock_guard lock(mutex_);
+    return timescale_.steps();
 }
 
 bool PtpClocks::ready(std::size_t clock) const {
@@ -95,8 +107,7 @@ PtpReport PtpClocks::report() {
     const std::lock_guard lock(mutex_);
     report.clocks = clocks_;
     report.master = master();
-    for (const PtpClockReport& clock : clocks_)
-        if (clock.contradicted) report.contradicted = clock.name;
+    report.contradicted = contradicted();
     report.steps = timescale_.steps();
     const auto ptp = timescale_.at(now);
     if (!ptp) return report;

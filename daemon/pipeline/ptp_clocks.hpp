@@ -66,7 +66,13 @@ class PtpClocks {
     /// The board saw this camera's exposures elsewhere than its clock says. Then PTP's time or the
     /// board's is wrong, and so may be the stamps of all cameras.
     void contradict(std::size_t clock, bool contradicted);
-    bool contradicted() const;
+
+    /// No stamp of any camera can be trusted: the board contradicts one that follows, or one is a
+    /// master.
+    bool distrusted() const;
+
+    /// Times that PTP's time stepped for all.
+    std::uint64_t steps() const;
 
     /// It can be triggered: it follows PTP and shows its time, and no camera is a master.
     bool ready(std::size_t clock) const;
@@ -81,6 +87,7 @@ class PtpClocks {
 
  private:
     std::string master() const;
+    std::string contradicted() const;
 
     clock::Translator& translator_;
     mutable std::mutex mutex_;

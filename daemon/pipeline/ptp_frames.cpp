@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/rounding.hpp"
+#include "settings/receive_mode.hpp"
 
 namespace versavis::daemon {
 
@@ -33,6 +34,14 @@ constexpr int misfits_to_unlock = 3;
 /// clocks' sigma and the middle of a packet's way may be.
 constexpr Duration arrival_margin = milliseconds(1);
 
+/// What is stamped longer before its arrival is stamped by another clock, not held up.
+constexpr Duration oldest_frame = seconds(5);
+
+/// A length that differs by more from what the camera was set to is another one: rounding of
+/// exposures, as of rows, is less.
+constexpr std::int64_t part_of_length = 20;
+constexpr Duration least_difference = microseconds(50);
+
 /// From the exposure's start.
 Duration offset(pairing::Instant instant, Duration length) {
     switch (instant) {
@@ -49,7 +58,8 @@ PtpFrames::PtpFrames(const CameraConfiguration& configuration, std::size_t most_
       period_(period_of(configuration)),
       latency_(from_us(configuration.latency_us)),
       longest_(from_us(configuration.max_exposure_us)),
-      latest_arrival_(from_us(configuration.latest_arrival_ms * 1e3)),
+      latest_arrival_(from_us(configuration.latest_arrival_ms * 1e3) +
+                      receive_lateness(configuration)),
       exposure_(from_us(configuration.exposure_us)),
       most_held_(most_held),
       settings_(period_ * (configuration.auto_exposure.delay_frames + 2)),
@@ -83,8 +93,29 @@ void PtpFrames::acknowledged(std::uint64_t trigger) {
 }
 
 void PtpFrames::set_exposure(Duration exposure, HostTime since) {
+    varies_ = exposure.ns == 0;
     settings_.add(exposure, since);
     if (exposure.ns != 0) exposure_ = exposure;
+}
+
+void PtpFrames::read_exposure(Duration exposure, HostTime at) {
+    if (exposure.ns == 0) return;
+    exposure_ = exposure;
+    if (!varies_) settings_.add(exposure, at);
+}
+
+void PtpFrames::reconfigure(const CameraConfiguration& configuration) {
+    refuse_all(EventReason::reset);
+    PtpFrames fresh(configuration, most_held_);
+    fresh.numbers_ = numbers_;
+    fresh.newest_ = newest_;
+    fresh.following_since_ = following_since_;
+    fresh.exposure_ = exposure_;
+    fresh.settings_ = settings_;
+    fresh.varies_ = varies_;
+    fresh.verdicts_ = std::move(verdicts_);
+    if (fresh.configured_ == pairing::Instant::unknown) fresh.stamped_ = stamped_;
+    *this = std::move(fresh);
 }
 
 /// The trigger that an exposure with this start is of; null: none.
@@ -115,22 +146,56 @@ bool PtpFrames::has_surplus_id(std::uint64_t block_id, std::uint64_t trigger) co
     return block_id - fitted_->block_id > got;
 }
 
-/// When and for how long the camera exposed the frame, by its own account.
-PtpExposure PtpFrames::account(const pairing::Arrival& arrival, Duration length) {
-    const auto range = settings_.at(arrival.arrived);
-    PtpExposure exposure;
-    exposure.length_known = length.ns != 0 || range;
-    if (length.ns != 0) {
-        // One that changed may be the one of the frame before.
-        const Duration before = std::exchange(length_before_, length);
-        exposure.length = length;
-        if (before.ns != 0) exposure.middle_sigma = absolute(length - before) / 2;
+/// When and for how long the camera exposed the frame, by its own account. Refused: that account
+/// is none that it was set to.
+EventReason PtpFrames::measure(const pairing::Arrival& arrival, const Account& length,
+                               PtpExposure& exposure) const {
+    std::optional<LengthRange> range;
+    if (!varies_) range = settings_.at(arrival.arrived);
+    const Duration said = length.event.ns != 0 ? length.event : length.chunk;
+    exposure.length_known = said.ns != 0 || range;
+    Duration doubt;
+    if (said.ns != 0) {
+        if (said.ns < 0 || said > longest_ + least_difference) return EventReason::wrong_exposure;
+        exposure.length = said;
+        if (range) {
+            const Duration tolerance = std::max(said / part_of_length, least_difference);
+            if (said + tolerance < range->shortest || said - tolerance > range->longest)
+                return EventReason::wrong_exposure;
+            if (length.event.ns == 0)
+                doubt = std::max(absolute(said - range->shortest), absolute(said - range->longest));
+        }
+    } else if (range) {
+        exposure.length = (range->shortest + range->longest) / 2;
+        doubt = range->width() / 2;
     } else {
-        exposure.length = range ? (range->shortest + range->longest) / 2 : exposure_;
-        exposure.middle_sigma = range ? range->width() / 4 : longest_ / 2;
+        exposure.length = exposure_;
+        doubt = longest_;
     }
     exposure.start = arrival.camera_time - offset(stamped_, exposure.length);
-    return exposure;
+    exposure.middle_sigma = doubt / 2;
+    if (stamped_ == pairing::Instant::middle) exposure.middle_sigma = {};
+    if (stamped_ == pairing::Instant::end) exposure.start_sigma = doubt;
+    return EventReason::none;
+}
+
+/// Its exposure varies, and only the frame's data say how long this one was.
+bool PtpFrames::length_may_lag(const Account& length, HostTime at) const {
+    return length.event.ns == 0 && length.chunk.ns != 0 && (varies_ || !settings_.at(at));
+}
+
+/// What this frame says may be of the one before, which waited for it. If another was lost in
+/// between, nobody knows.
+void PtpFrames::learn_length(const pairing::Arrival& arrival, const Account& length) {
+    if (held_.empty() || !held_.back().length_may_lag) return;
+    Held& before = held_.back();
+    const bool next = arrival.block_id == before.arrival.block_id + 1 && length.chunk.ns != 0;
+    const Duration doubt = next ? absolute(length.chunk - before.exposure.length) : longest_;
+    before.length_may_lag = false;
+    if (stamped_ == pairing::Instant::end) before.exposure.start_sigma = doubt;
+    if (stamped_ != pairing::Instant::middle)
+        before.exposure.middle_sigma =
+            rounded(std::hypot(before.exposure.middle_sigma.ns, doubt.ns / 2));
 }
 
 EventReason PtpFrames::judge(const pairing::Arrival& arrival, const clock::HostEstimate& stamped,
@@ -138,7 +203,10 @@ EventReason PtpFrames::judge(const pairing::Arrival& arrival, const clock::HostE
     Pending* pending = match(exposure.start);
     // What is further off than a period is off what the clock shows, and not off some trigger.
     if (absolute(start_delay_) > period_) start_delay_ = stamped.time - arrival.arrived;
-    if (pending == nullptr) return EventReason::mismatch;
+    const Duration age = arrival.arrived - stamped.time;
+    if (pending == nullptr)
+        return age > latest_arrival_ && age < oldest_frame ? EventReason::too_old
+                                                           : EventReason::mismatch;
     exposure.start_delay = start_delay_;
     exposure.trigger = pending->trigger.number;
     exposure.tick = pending->trigger.tick;
@@ -161,17 +229,21 @@ EventReason PtpFrames::judge(const pairing::Arrival& arrival, const clock::HostE
         usual_arrival_ ? *usual_arrival_ + (delay - *usual_arrival_) / parts_to_follow : delay);
     pending->answered = true;
     // What nobody knows to be the start may be as much later.
-    if (stamped_ == pairing::Instant::unknown)
+    if (stamped_ == pairing::Instant::unknown) {
+        exposure.start_sigma = absolute(start_delay_);
         exposure.middle_sigma = rounded(std::hypot(start_delay_.ns, exposure.middle_sigma.ns));
+    }
     return EventReason::none;
 }
 
-void PtpFrames::add(const pairing::Arrival& arrival, Duration length,
+void PtpFrames::add(const pairing::Arrival& arrival, const Account& length,
                     const std::optional<clock::HostEstimate>& stamped) {
-    PtpExposure exposure = account(arrival, length);
-    const bool clock_known = stamped && following_since_;
-    const EventReason reason =
-        clock_known ? judge(arrival, *stamped, exposure) : EventReason::no_clock;
+    learn_length(arrival, length);
+    PtpExposure exposure;
+    EventReason reason = measure(arrival, length, exposure);
+    if (reason == EventReason::none)
+        reason = stamped && following_since_ ? judge(arrival, *stamped, exposure)
+                                             : EventReason::no_clock;
     misfits_ = reason == EventReason::mismatch ? misfits_ + 1 : 0;
     if (misfits_ >= misfits_to_unlock) unlock();
     if (reason != EventReason::none) return refuse(arrival, reason);
@@ -179,7 +251,7 @@ void PtpFrames::add(const pairing::Arrival& arrival, Duration length,
         refuse(held_.front().arrival, EventReason::no_buffer);
         held_.pop_front();
     }
-    held_.push_back({arrival, exposure});
+    held_.push_back({arrival, exposure, length_may_lag(length, arrival.arrived)});
 }
 
 void PtpFrames::refuse(const pairing::Arrival& arrival, EventReason reason) {
@@ -200,6 +272,7 @@ void PtpFrames::refuse_all(EventReason reason) {
 
 void PtpFrames::lose_clock() {
     following_since_.reset();
+    newest_ = {};  // PTP's time may go on from anywhere
     refuse_all(EventReason::no_clock);
 }
 
@@ -210,6 +283,7 @@ void PtpFrames::read_clock(const clock::ClockReading& reading, clock::Agreement 
     while (!held_.empty()) {
         const Held& first = held_.front();
         if (reading.shown < first.exposure.start + first.exposure.length) return;
+        if (first.length_may_lag) return;
         usual_delay_ = usual_delay_ + (first.exposure.start_delay - usual_delay_) / parts_to_follow;
         proved_ = locked_ = true;
         verdicts_.push_back({first.arrival, first.exposure, EventReason::none});
@@ -235,7 +309,8 @@ void PtpFrames::restart(pairing::Instant stamped) {
     following_since_.reset();
     unlock();
     acknowledges_ = false;
-    length_before_ = usual_delay_ = {};
+    usual_delay_ = {};
+    varies_ = true;
     stamped_ = configured_ != pairing::Instant::unknown ? configured_ : stamped;
     settings_.clear();
 }

@@ -53,9 +53,14 @@ class PtpFrames {
     /// The camera has it.
     void acknowledged(std::uint64_t trigger);
 
-    /// `length`: what the camera says that it exposed, of this frame; 0: it does not.
+    /// What the camera says of a frame's exposure; 0: it does not.
+    struct Account {
+        Duration event;  ///< by events of this exposure
+        Duration chunk;  ///< with the frame's data; some firmware has that of the frame before
+    };
+
     /// `stamped`: the frame's stamp on the host; none: PTP's time is not known.
-    void add(const pairing::Arrival& arrival, Duration length,
+    void add(const pairing::Arrival& arrival, const Account& length,
              const std::optional<clock::HostEstimate>& stamped);
 
     /// The camera's clock was read.
@@ -72,6 +77,12 @@ class PtpFrames {
 
     /// What the camera exposes from now on; 0: it varies.
     void set_exposure(Duration exposure, HostTime since);
+
+    /// What its register says; of one that varies, nothing is known of other moments.
+    void read_exposure(Duration exposure, HostTime at);
+
+    /// The same camera by other values. Nothing that waits is used any more.
+    void reconfigure(const CameraConfiguration& configuration);
 
     /// Frames that wait for a reading.
     bool waiting() const { return !held_.empty(); }
@@ -98,6 +109,7 @@ class PtpFrames {
     struct Held {
         pairing::Arrival arrival;
         PtpExposure exposure;
+        bool length_may_lag = false;  ///< what the next frame says may be this one's
     };
 
     EventReason judge(const pairing::Arrival& arrival, const clock::HostEstimate& stamped,
@@ -105,7 +117,10 @@ class PtpFrames {
     Pending* match(CameraTime start);
     bool lost(const Pending& pending) const;
     bool has_surplus_id(std::uint64_t block_id, std::uint64_t trigger) const;
-    PtpExposure account(const pairing::Arrival& arrival, Duration length);
+    EventReason measure(const pairing::Arrival& arrival, const Account& length,
+                        PtpExposure& exposure) const;
+    bool length_may_lag(const Account& length, HostTime at) const;
+    void learn_length(const pairing::Arrival& arrival, const Account& length);
     void refuse(const pairing::Arrival& arrival, EventReason reason);
     void refuse_all(EventReason reason);
     void unlock();
@@ -118,13 +133,13 @@ class PtpFrames {
     Duration exposure_;  ///< expected
     std::size_t most_held_;
     ReportedExposure settings_;
+    bool varies_ = true;
     pairing::Instant configured_;
     pairing::Instant stamped_;  ///< unknown: taken for the start, and sigma says so
     std::uint64_t numbers_ = 0;
     CameraTime newest_;  ///< trigger sent
     bool proved_ = false;
     std::optional<CameraTime> following_since_;  ///< the clock agrees, and follows PTP
-    Duration length_before_;
     Duration start_delay_;
     Duration usual_delay_;  ///< the same, of proved frames
     /// The newest frame that fitted a trigger.

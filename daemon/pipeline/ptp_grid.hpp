@@ -2,6 +2,7 @@
 // The instants in PTP time at which a camera's exposures have their middle: the same for all hosts.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -18,9 +19,9 @@ class PtpGrid {
 
     CameraTime point(std::uint64_t k) const { return CameraTime{unphased_ns(k)} + phase_; }
 
-    /// The first point that is not before `from`, which is later than 1970.
+    /// The first point that is not before `from`, nor before PTP's zero.
     std::uint64_t first(CameraTime from) const {
-        const auto elapsed = static_cast<Wide>((from - phase_).ns);
+        const auto elapsed = static_cast<Wide>(std::max<std::int64_t>(0, (from - phase_).ns));
         auto k = static_cast<std::uint64_t>(elapsed * rate_uhz_ / ns_per_megasecond);
         while (point(k) < from) ++k;
         return k;

@@ -25,6 +25,7 @@ void StrobeWitness::take(const clock::HostEstimate& start, Starts& own, Starts& 
     const Duration later = start.time - nearest->time;
     report_.error = by_board ? -later : later;
     ++report_.compared;
+    compared_ = start.time;
     if (contradicts) ++report_.contradicting;
     in_a_row_ = contradicts ? in_a_row_ + 1 : 0;
     others.erase(others.begin(), nearest + 1);

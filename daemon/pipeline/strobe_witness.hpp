@@ -30,8 +30,11 @@ class StrobeWitness {
     }
     void rose(const clock::HostEstimate& by_board) { take(by_board, boards_, cameras_, true); }
 
-    /// Starts in a row lie further apart than both bounds allow: one of the clocks is wrong.
-    bool contradicts() const { return in_a_row_ >= starts_to_contradict; }
+    /// Starts in a row lay further apart than both bounds allow, lately: one of the clocks is
+    /// wrong.
+    bool contradicts(HostTime now) const {
+        return in_a_row_ >= starts_to_contradict && now - compared_ < evidence_memory;
+    }
 
     const StrobeReport& report() const { return report_; }
 
@@ -41,6 +44,10 @@ class StrobeWitness {
     static constexpr int starts_to_contradict = 3;
     static constexpr std::size_t most_kept = 16;
 
+    /// A line that shows nothing more is no witness. Half: slow cameras lapse between two frames.
+    /// Twice: frames are withheld for as long after a line was unplugged.
+    static constexpr Duration evidence_memory = seconds(10);
+
     void take(const clock::HostEstimate& start, Starts& own, Starts& others, bool by_board);
 
     Duration period_;
@@ -48,6 +55,7 @@ class StrobeWitness {
     Starts cameras_;
     Starts boards_;
     int in_a_row_ = 0;
+    HostTime compared_;
     StrobeReport report_;
 };
 

@@ -14,7 +14,8 @@ struct PtpExposure {
     CameraTime start;
     Duration length;
     Duration start_delay;       ///< trigger to start, beyond the configured latency
-    Duration middle_sigma;      ///< for what is not known of instant and length
+    Duration middle_sigma;      ///< for what is not known of instant and length ...
+    Duration start_sigma;       ///< ... and the same of the start
     bool length_known = false;  ///< else it is the expected one
 
     CameraTime middle() const { return start + length / 2; }

@@ -47,11 +47,11 @@ TEST_CASE("clock_graph: each clock has a parent that comes before it") {
         CHECK(before);
     }
     CHECK(clocks.size() == 2 + 2 * 8);
-    CHECK(find(clocks, "front/cam0").parent == "front/board");
-    CHECK(find(clocks, "front/cam1").parent == "front/ptp");
+    CHECK(find(clocks, "front/cam0").parent == "front:board");
+    CHECK(find(clocks, "front/cam1").parent == "front:ptp");
     CHECK(find(clocks, "rear/cam2").parent == "host");
-    CHECK(find(clocks, "rear/lidar").parent == "rear/board");
-    CHECK(find(clocks, "front/pps").parent == "front/board");
+    CHECK(find(clocks, "rear/lidar").parent == "rear:board");
+    CHECK(find(clocks, "front:pps").parent == "front:board");
 }
 
 TEST_CASE("clock_graph: bounds, offsets and states are those of the documents") {
@@ -59,8 +59,8 @@ TEST_CASE("clock_graph: bounds, offsets and states are those of the documents") 
         clock_graph({true, 1'500'000}, {{"port", "SLAVE", "", 85}}, {{"front", service_status()}});
     CHECK(find(clocks, "host").bound_ns == 1'500'000);
     CHECK(find(clocks, "port").offset_ns == 85);
-    CHECK(find(clocks, "front/board").bound_ns == 41250);
-    CHECK(find(clocks, "front/ptp").bound_ns == 18800);
+    CHECK(find(clocks, "front:board").bound_ns == 41250);
+    CHECK(find(clocks, "front:ptp").bound_ns == 18800);
     CHECK(find(clocks, "front/cam1").offset_ns == 120);
     CHECK(find(clocks, "front/lidar").offset_ns == 210);
     CHECK_FALSE(find(clocks, "front/imu0").bound_ns);
@@ -68,7 +68,7 @@ TEST_CASE("clock_graph: bounds, offsets and states are those of the documents") 
     CHECK(find(clocks, "front/cam2").state == "absent");
     CHECK_FALSE(find(clocks, "front/cam2").good);
     const std::string text = graph_text(clocks);
-    CHECK_THAT(text, Contains("front/board  exchanges with the board: locked, within 41.2 us"));
+    CHECK_THAT(text, Contains("front:board  exchanges with the board: locked, within 41.2 us"));
     CHECK_THAT(text, Contains("37.000 s ahead of UTC"));
     CHECK_THAT(text, Contains("absent  <- not good\n") && Contains("no camera answers\n"));
     CHECK(std::count(text.begin(), text.end(), '\n') == 2 + 8 + 1);
@@ -83,13 +83,13 @@ TEST_CASE("clock_graph: what does not hold is not good") {
         change(status);
         return find(clock_graph({}, {}, {{"x", status}}), name).good;
     };
-    CHECK_FALSE(good("x/board", [](json& s) { s["board"]["health"] = "degraded"; }));
-    CHECK_FALSE(good("x/board", [](json& s) { s["clock"]["health"] = "degraded"; }));
-    CHECK_FALSE(good("x/pps", [](json& s) { s["clock"]["pps"] = "lost"; }));
-    CHECK_FALSE(good("x/pps", [](json& s) { s["clock"]["second_difference_s"] = 1; }));
-    CHECK_FALSE(good("x/ptp", [](json& s) { s["ptp"]["master"] = "cam1"; }));
-    CHECK_FALSE(good("x/ptp", [](json& s) { s["ptp"]["contradicted"] = "cam1"; }));
-    CHECK_FALSE(good("x/ptp", [](json& s) { s["ptp"]["state"] = "init"; }));
+    CHECK_FALSE(good("x:board", [](json& s) { s["board"]["health"] = "degraded"; }));
+    CHECK_FALSE(good("x:board", [](json& s) { s["clock"]["health"] = "degraded"; }));
+    CHECK_FALSE(good("x:pps", [](json& s) { s["clock"]["pps"] = "lost"; }));
+    CHECK_FALSE(good("x:pps", [](json& s) { s["clock"]["second_difference_s"] = 1; }));
+    CHECK_FALSE(good("x:ptp", [](json& s) { s["ptp"]["master"] = "cam1"; }));
+    CHECK_FALSE(good("x:ptp", [](json& s) { s["ptp"]["contradicted"] = "cam1"; }));
+    CHECK_FALSE(good("x:ptp", [](json& s) { s["ptp"]["state"] = "init"; }));
     CHECK_FALSE(good("x/cam1", [](json& s) { s["cameras"][1]["health"] = "degraded"; }));
     CHECK_FALSE(find(clock_graph({}, {{"p", "LISTENING", "", {}}}, {}), "p").good);
     CHECK(find(clock_graph({}, {{"p", "MASTER", "", {}}}, {}), "p").good);
@@ -104,6 +104,6 @@ TEST_CASE("clock_graph: documents of other releases, and damaged ones, give what
     unused["board"]["state"] = "unused";
     unused["ptp"] = nullptr;
     const auto clocks = clock_graph({}, {}, {{"x", unused}});
-    CHECK_THROWS(find(clocks, "x/board"));
+    CHECK_THROWS(find(clocks, "x:board"));
     CHECK_FALSE(graph_text(clocks).empty());
 }

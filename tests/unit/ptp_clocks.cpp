@@ -59,6 +59,7 @@ TEST_CASE("ptp_clocks: no camera is triggered while one is a master, until that 
     two.clocks.note(two.right, port("Master"));
     CHECK_FALSE(two.clocks.ready(two.left));
     CHECK(two.clocks.report().master == "right");
+    CHECK(two.clocks.distrusted());
     two.clocks.note(two.right, {});
     CHECK(two.clocks.ready(two.left));
     CHECK(two.clocks.report().master.empty());
@@ -104,8 +105,12 @@ TEST_CASE("ptp_clocks: where PTP's time steps for all, a new epoch begins") {
 TEST_CASE("ptp_clocks: what the board contradicts holds for all, until that camera is gone") {
     TwoClocks two;
     two.clocks.contradict(two.left, true);
-    CHECK(two.clocks.contradicted());
+    CHECK(two.clocks.distrusted());
     CHECK(two.clocks.report().contradicted == "left");
     two.clocks.note(two.left, {});
-    CHECK_FALSE(two.clocks.contradicted());
+    CHECK_FALSE(two.clocks.distrusted());
+    two.clocks.contradict(two.right, true);
+    CHECK(two.clocks.distrusted());
+    two.read(two.right, seconds(1));  // what the board says is about that
+    CHECK_FALSE(two.clocks.distrusted());
 }

@@ -68,7 +68,7 @@ TEST_CASE("ptp_diagnosis: the state of the port says what is missing") {
     PtpStatus& port = bench.status.ptp->clocks[0].status;
     for (const auto& [state, words] : {std::pair{"", "does not say"},
                                        {"Listening", "ptp4l"},
-                                       {"Passive", "hears no master"},
+                                       {"Passive", "slave only"},
                                        {"Uncalibrated", "begins to follow"},
                                        {"Disabled", "restart the camera"}}) {
         port.state = state;

@@ -157,6 +157,17 @@ TEST_CASE("ptp_frames: what waits is refused where the clock departs, and what b
     CHECK(bench.verdict() == EventReason::none);
 }
 
+TEST_CASE("ptp_frames: where PTP's time goes back, triggers go on from there") {
+    PtpCamera bench;
+    bench.frame(bench.trigger());
+    bench.read();
+    bench.read(Agreement::differs);
+    const CameraTime back{1'000'000'000'000};
+    const PtpTrigger next = bench.frames.next(back);
+    CHECK(next.at > back);
+    CHECK(next.at - back < seconds(1));
+}
+
 TEST_CASE("ptp_frames: stamps that no trigger makes are refused, and by how much they are off") {
     PtpCamera bench;
     bench.frame(bench.trigger(), microseconds(250));
@@ -224,19 +235,82 @@ TEST_CASE("ptp_frames: what is not known of instant and length is in sigma") {
         arrival.camera_time = trigger.at + late;
         arrival.arrived = HostTime{(arrival.camera_time - host_behind).ns} + milliseconds(30);
         bench.now = arrival.arrived;
-        bench.frames.add(arrival, length, on_host(arrival.camera_time));
+        bench.frames.add(arrival, {{}, length}, on_host(arrival.camera_time));
         bench.read();
         const auto verdicts = bench.frames.take_verdicts();
         REQUIRE(verdicts.size() == 1);
         REQUIRE(verdicts[0].exposure);
         return verdicts[0].exposure->middle_sigma;
     };
-    CHECK(sigma_of(microseconds(40), milliseconds(3)) == microseconds(40));
-    CHECK(sigma_of({}, milliseconds(3)).ns == 0);
-    CHECK(sigma_of({}, milliseconds(5)) == milliseconds(1));  // or still the one before
-    bench.frames.set_exposure({}, bench.now);
+    const Duration before = milliseconds(3);
+    const Duration after = milliseconds(5);
+    CHECK(sigma_of(microseconds(40), before) == microseconds(40));
+    CHECK(sigma_of({}, before).ns == 0);
+    bench.frames.set_exposure(after, bench.now);
+    CHECK(sigma_of({}, before) == milliseconds(1));  // the data may be of the frame before
     bench.now = bench.now + seconds(1);
+    CHECK(sigma_of({}, after).ns == 0);
+    CHECK(sigma_of({}, {}).ns == 0);  // as it was set
+    bench.frames.set_exposure({}, bench.now);
+    bench.frames.read_exposure(after, bench.now);
     CHECK(sigma_of({}, {}) == milliseconds(10));  // half of the longest there may be
+}
+
+TEST_CASE("ptp_frames: a varying length that frames carry is sure only after the next frame") {
+    PtpCamera bench;
+    bench.frames.set_exposure({}, bench.now);
+    const auto add = [&](Duration length, Duration event = {}) {
+        const PtpTrigger trigger = bench.trigger();
+        pairing::Arrival arrival;
+        arrival.block_id = ++bench.block_id;
+        arrival.camera_time = trigger.at;
+        arrival.arrived = HostTime{(trigger.at - host_behind).ns} + milliseconds(30);
+        bench.now = std::max(bench.now, arrival.arrived);
+        bench.frames.add(arrival, {event, length}, on_host(arrival.camera_time));
+        bench.read();
+        return bench.frames.take_verdicts();
+    };
+    CHECK(add(milliseconds(1)).empty());
+    auto verdicts = add(milliseconds(1));
+    REQUIRE(verdicts.size() == 1);
+    CHECK(verdicts[0].exposure->middle_sigma.ns == 0);
+    verdicts = add(milliseconds(5));  // the one before may have been as long
+    REQUIRE(verdicts.size() == 1);
+    CHECK(verdicts[0].exposure->middle_sigma == milliseconds(2));
+    ++bench.block_id;  // lost, and with it what it would have said
+    verdicts = add(milliseconds(5));
+    REQUIRE(verdicts.size() == 1);
+    CHECK(verdicts[0].exposure->middle_sigma == milliseconds(10));
+    verdicts = add(milliseconds(4), milliseconds(6));  // events are of this exposure
+    REQUIRE(verdicts.size() == 2);
+    CHECK(verdicts[1].exposure->length == milliseconds(6));
+    CHECK(verdicts[1].exposure->middle_sigma.ns == 0);
+}
+
+TEST_CASE("ptp_frames: a length that was never set is refused") {
+    PtpCamera bench;
+    for (const Duration wrong : {milliseconds(4), milliseconds(-1), seconds(3), Duration{3000}}) {
+        const PtpTrigger trigger = bench.trigger();
+        pairing::Arrival arrival;
+        arrival.camera_time = trigger.at;
+        arrival.arrived = HostTime{(trigger.at - host_behind).ns} + milliseconds(30);
+        bench.now = arrival.arrived;
+        bench.frames.add(arrival, {{}, wrong}, on_host(arrival.camera_time));
+        CHECK(bench.verdict() == EventReason::wrong_exposure);
+    }
+}
+
+TEST_CASE("ptp_frames: other values give back what waits, and count on") {
+    PtpCamera bench;
+    const PtpTrigger trigger = bench.trigger();
+    bench.frame(trigger);
+    bench.frames.reconfigure(camera_of(40));
+    CHECK(bench.verdict() == EventReason::reset);
+    const PtpTrigger next = bench.trigger();
+    CHECK(next.number == trigger.number + 1);
+    bench.frame(next);
+    bench.read();
+    CHECK(bench.verdict() == EventReason::none);
 }
 
 TEST_CASE("ptp_frames: other instants than the start are taken off") {

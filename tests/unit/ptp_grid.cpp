@@ -45,6 +45,13 @@ TEST_CASE("ptp_grid: the first point is not before, and the one before it is") {
     }
 }
 
+TEST_CASE("ptp_grid: there are no points before PTP's zero") {
+    const PtpGrid grid(20, microseconds(7000));
+    CHECK(grid.first({3}) == 0);
+    CHECK(grid.first({-5'000'000'000}) == 0);
+    CHECK(grid.first({8'000'000}) == 1);
+}
+
 TEST_CASE("ptp_grid: an odd rate does not drift from its fraction") {
     const PtpGrid grid(12.5, {});
     CHECK(grid.point(25'000'000'000) == CameraTime{2'000'000'000'000'000'000});

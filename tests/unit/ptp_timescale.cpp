@@ -131,6 +131,24 @@ TEST_CASE("ptp_timescale: where all step, the estimate begins anew, and none agr
     }
 }
 
+TEST_CASE("ptp_timescale: of two that differ from the start, one leads, and nothing steps") {
+    Network network(8);
+    PtpTimescale timescale;
+    const std::size_t one = timescale.add_clock();
+    const std::size_t other = timescale.add_clock();
+    for (int i = 0; i < 50; ++i) {
+        timescale.add(one, network.read());
+        timescale.add(other, network.read(seconds(9)));
+    }
+    CHECK(timescale.steps() == 0);
+    CHECK(timescale.add(one, network.read()) != Agreement::differs);
+    CHECK(timescale.add(other, network.read(seconds(9))) == Agreement::differs);
+    timescale.forget(one);
+    network.now = network.now + seconds(5);
+    for (int i = 0; i < 50; ++i) timescale.add(other, network.read(seconds(9)));
+    CHECK(timescale.steps() == 1);
+}
+
 TEST_CASE("ptp_timescale: a clock that was forgotten is no witness") {
     Network network(6);
     PtpTimescale timescale;

@@ -44,13 +44,14 @@ TEST_CASE("strobe_witness: three in a row beyond both bounds contradict, and one
     CHECK(witness.report().contradicting == 0);
     compare(5, microseconds(-120));
     compare(6, microseconds(120));
-    CHECK_FALSE(witness.contradicts());
+    CHECK_FALSE(witness.contradicts(start_at(10).time));
     compare(7, milliseconds(3));
-    CHECK(witness.contradicts());
+    CHECK(witness.contradicts(start_at(10).time));
     compare(8, milliseconds(3));
-    CHECK(witness.contradicts());
+    CHECK(witness.contradicts(start_at(10).time));
+    CHECK_FALSE(witness.contradicts(start_at(8).time + seconds(11)));  // the line shows no more
     compare(9, {});
-    CHECK_FALSE(witness.contradicts());
+    CHECK_FALSE(witness.contradicts(start_at(10).time));
 }
 
 TEST_CASE("strobe_witness: what one side alone saw is forgotten, and compared with nothing else") {

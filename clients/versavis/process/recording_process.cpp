@@ -11,6 +11,7 @@
 #include "base/byte_cursor.hpp"
 #include "base/median.hpp"
 #include "base/shallow_json.hpp"
+#include "base/stamp_source.hpp"
 #include "engine/rounding.hpp"
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
@@ -229,9 +230,7 @@ class Processing {
         }
         const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
         stream.counts.contradicted += contradicted ? 1U : 0U;
-        const bool by_board =
-            frame.stamp_kind() != StampKind::arrival && frame.stamp_kind() != StampKind::camera_ptp;
-        if (by_board && !contradicted) {
+        if (stamped_by_board(frame) && !contradicted) {
             read.stamp = restamping_.stamp(frame.board_time, frame.host_time);
             read.choice = Choice::no_estimate;
             const bool measured = frame.stamp_kind() == StampKind::measured_middle;

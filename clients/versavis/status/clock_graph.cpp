@@ -74,13 +74,12 @@ class Instance {
         add_ptp();
         for (const json& camera : parts(status_, "cameras")) add_camera(camera);
         for (const json& imu : parts(status_, "imus")) {
-            ClockNode node = device(imu, path_of(text(imu, "name")), "imu", path_of("board"));
+            ClockNode node = device(imu, path_of(text(imu, "name")), "imu", own("board"));
             node.path = "sampled by the board";
             clocks_.push_back(std::move(node));
         }
         for (const json& output : parts(status_, "time_outputs")) {
-            ClockNode node =
-                device(output, path_of(text(output, "name")), "lidar", path_of("board"));
+            ClockNode node = device(output, path_of(text(output, "name")), "lidar", own("board"));
             node.path = "pulses and sentences of the board";
             node.offset_ns = number(output, "error_ns");
             clocks_.push_back(std::move(node));
@@ -90,11 +89,14 @@ class Instance {
  private:
     std::string path_of(const std::string& device) const { return name_ + "/" + device; }
 
+    /// No camera can have such a name.
+    std::string own(const char* clock) const { return name_ + ":" + clock; }
+
     void add_board() {
         const json board = part(status_, "board");
         if (text(board, "state") == "unused") return;
         const json clock = part(status_, "clock");
-        ClockNode node = device(clock, path_of("board"), "board", host_name);
+        ClockNode node = device(clock, own("board"), "board", host_name);
         node.path = "exchanges with the board";
         const bool lost = text(board, "health") == "degraded";
         if (lost) node.state = text(board, "state");
@@ -105,9 +107,9 @@ class Instance {
         const std::string pps = text(clock, "pps");
         if (pps == "off" || pps.empty()) return;
         ClockNode receiver;
-        receiver.name = path_of("pps");
+        receiver.name = own("pps");
         receiver.kind = "receiver";
-        receiver.parent = path_of("board");
+        receiver.parent = own("board");
         receiver.path = "pulses at the board";
         receiver.state = pps;
         receiver.good = pps == "used" && number(clock, "second_difference_s").value_or(0) == 0;
@@ -119,7 +121,7 @@ class Instance {
         const json ptp = part(status_, "ptp");
         if (ptp.empty()) return;
         ClockNode node;
-        node.name = path_of("ptp");
+        node.name = own("ptp");
         node.kind = "ptp";
         node.parent = host_name;
         node.path = "readings of cameras' clocks";
@@ -138,7 +140,7 @@ class Instance {
         const std::string trigger = text(camera, "trigger");
         ClockNode node =
             device(camera, path_of(text(camera, "name")), "camera",
-                   trigger == "free" ? host_name : path_of(trigger == "ptp" ? "ptp" : "board"));
+                   trigger == "free" ? host_name : own(trigger == "ptp" ? "ptp" : "board"));
         if (node.state == "streaming") node.state = text(camera, "pairing");
         if (trigger == "ptp") {
             const json port = part(camera, "ptp");

@@ -13,7 +13,7 @@
 namespace versavis::client {
 
 struct ClockNode {
-    std::string name;    ///< unique, as "default/board"
+    std::string name;    ///< unique, as "default:board" or "default/cam0"
     std::string kind;    ///< host, port, board, ptp, camera, imu, receiver or lidar
     std::string parent;  ///< name of the clock that it is compared with; empty: the root
     std::string path;    ///< how they are compared, or one follows the other

@@ -11,17 +11,13 @@
 #include <utility>
 
 #include "base/median.hpp"
+#include "base/stamp_source.hpp"
 #include "verify/even_line.hpp"
 #include "verify/picture_judge.hpp"
 
 namespace versavis::client {
 
 namespace {
-
-/// Its stamp is one of the board's.
-bool by_board(const FrameMetadata& frame) {
-    return frame.stamp_kind() != StampKind::arrival && frame.stamp_kind() != StampKind::camera_ptp;
-}
 
 /// What the same instant may differ by in two places: same_instant, when delays are subtracted.
 constexpr Duration same_instant = microseconds(1);
@@ -232,7 +228,7 @@ void CameraJudge::judge_run(std::size_t run) {
     std::vector<Claim*> claims;
     for (Claim& claim : claims_)
         if (claim.judged() && claim.run == run && claim.arrival != nullptr &&
-            claim.exposure != nullptr && by_board(claim.frame->frame))
+            claim.exposure != nullptr && stamped_by_board(claim.frame->frame))
             claims.push_back(&claim);
     if (claims.empty()) return;
     judge_steps(claims);
@@ -485,7 +481,7 @@ void CameraJudge::judge_translation() {
     for (Claim& claim : claims_) {
         const FrameMetadata& frame = claim.frame->frame;
         // What is out of bounds is wrong by that, and no measure for those beside it.
-        if (!claim.judged() || !by_board(frame) || frame.sigma_ns == sigma_unknown ||
+        if (!claim.judged() || !stamped_by_board(frame) || frame.sigma_ns == sigma_unknown ||
             absolute(clock_.outside_bounds(frame.board_time, frame.host_time)) >
                 allowed_error(frame.sigma_ns))
             continue;
@@ -512,7 +508,7 @@ StreamVerdict CameraJudge::finish(StreamOrder order) const {
         }
         for (const auto& [finding, by] : claim.findings) verdict.add(finding, by);
         if (const auto by = pictures.off(claim.frame->time)) verdict.add(Finding::pictures, *by);
-        if (!by_board(frame)) continue;
+        if (!stamped_by_board(frame)) continue;
         clock_.judge({frame.board_time, frame.host_time, claim.frame->time, frame.sigma_ns,
                       frame.epoch, frame.flags},
                      verdict);

@@ -12,8 +12,8 @@ constexpr Duration witness_memory = seconds(2);
 /// Steps of the iteration that inverts the estimate; each leaves a thousandth of the error.
 constexpr int inversions = 4;
 
-/// 146 years after PTP's zero: later times are no times, and cannot be computed with.
-constexpr std::int64_t latest_ns = std::int64_t{1} << 62;
+/// 73 years after PTP's zero: later times are no times, and cannot be computed with.
+constexpr std::int64_t latest_ns = std::int64_t{1} << 61;
 
 bool possible(CameraTime ptp) { return ptp.ns > 0 && ptp.ns < latest_ns; }
 
@@ -46,20 +46,34 @@ Agreement PtpTimescale::add(std::size_t clock, const ClockReading& reading) {
             estimate.time + tolerance < reading.before || estimate.time - tolerance > reading.after;
         if (differs) agreed_[clock].reset();
         if (differs && confirmed_by_another(clock, reading.after)) return Agreement::differs;
-        const std::uint64_t steps = filter_.restarts();
+        const std::uint64_t restarts = filter_.restarts();
         filter_.add(exchange_of(reading));
-        if (filter_.restarts() != steps)
+        if (filter_.restarts() != restarts) {
+            ++steps_;
+            leader_.reset();
             for (auto& agreed : agreed_) agreed.reset();
+        }
         if (differs || filter_.contradicted()) return Agreement::differs;
         if (reading.width() > widest_reading) return Agreement::unknown;
         agreed_[clock] = reading.after;
         return Agreement::agrees;
     }
-    filter_.add(exchange_of(reading));
+    if (leads(clock, reading.after)) filter_.add(exchange_of(reading));
     return Agreement::unknown;
 }
 
-void PtpTimescale::forget(std::size_t clock) { agreed_[clock].reset(); }
+/// One clock alone confirms what it began: two that differ would begin anew in turns.
+bool PtpTimescale::leads(std::size_t clock, HostTime now) {
+    if (!leader_ || now - leader_read_ > witness_memory) leader_ = clock;
+    if (leader_ != clock) return false;
+    leader_read_ = now;
+    return true;
+}
+
+void PtpTimescale::forget(std::size_t clock) {
+    agreed_[clock].reset();
+    if (leader_ == clock) leader_.reset();
+}
 
 std::optional<HostEstimate> PtpTimescale::to_host(CameraTime ptp) const {
     if (!filter_.confirmed() || !possible(ptp)) return std::nullopt;

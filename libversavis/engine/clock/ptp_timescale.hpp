@@ -48,10 +48,8 @@ class PtpTimescale {
     /// What PTP's clocks show then; the same.
     std::optional<CameraTime> at(HostTime host) const;
 
-    /// Times that the estimate began anew: stamps before and after do not compare.
-    std::uint64_t steps() const { return filter_.restarts(); }
-
-    const EnvelopeFilter& filter() const { return filter_; }
+    /// Times that an estimate that held was given up: stamps before and after do not compare.
+    std::uint64_t steps() const { return steps_; }
 
     /// A reading that took longer proves nothing. Half: busy hosts prove less often. Twice: clocks
     /// may be off by twice as much before that shows.
@@ -59,9 +57,13 @@ class PtpTimescale {
 
  private:
     bool confirmed_by_another(std::size_t clock, HostTime now) const;
+    bool leads(std::size_t clock, HostTime now);
 
     EnvelopeFilter filter_;
     std::vector<std::optional<HostTime>> agreed_;  ///< by clock: when it did last
+    std::optional<std::size_t> leader_;            ///< the clock that a new estimate begins with
+    HostTime leader_read_;
+    std::uint64_t steps_ = 0;
 };
 
 }  // namespace versavis::clock
