@@ -251,6 +251,7 @@ void PtpFrames::add(const pairing::Arrival& arrival, const Account& length,
         refuse(held_.front().arrival, EventReason::no_buffer);
         held_.pop_front();
     }
+    if (varies_ && exposure.length_known) exposure_ = exposure.length;  // the next is about as long
     held_.push_back({arrival, exposure, length_may_lag(length, arrival.arrived)});
 }
 
