@@ -201,10 +201,17 @@ Expected<DescriptionGraph::Cost> DescriptionGraph::cost(const std::string& name)
 
 std::string expose_index_offsets(const std::string& text) {
     constexpr std::string_view attribute = "pOffset";
+    // As part of a name, such as PtpOffsetFromMaster, it is none.
+    const auto is_attribute = [&](std::size_t at) {
+        const std::size_t after = text.find_first_not_of(" \t\r\n", at + attribute.size());
+        return at > 0 && std::string_view(" \t\r\n").find(text[at - 1]) != std::string::npos &&
+               after != std::string::npos && text[after] == '=';
+    };
     std::string result;
     std::size_t copied = 0;
     for (std::size_t at = text.find(attribute); at != std::string::npos;
          at = text.find(attribute, at + 1)) {
+        if (!is_attribute(at)) continue;
         const std::size_t element = text.rfind('<', at);
         const std::size_t from = text.find_first_of("\"'", at);
         const std::size_t to = from == std::string::npos ? from : text.find(text[from], from + 1);

@@ -97,6 +97,22 @@ TEST_CASE("description_check: registers have a bounded length, constant where Ar
                Catch::Contains("another register"));
 }
 
+TEST_CASE("description_check: a name with pOffset in it is no offset of an index") {
+    const std::string loop =
+        "<Integer Name=\"Width\"><pValue>One</pValue></Integer>"
+        "<IntSwissKnife Name=\"One\"><pVariable Name=\"X\">One</pVariable>"
+        "<Formula>X+1</Formula></IntSwissKnife>";
+    CHECK_THAT(verdict(description_with(loop)), Catch::Contains("leads back to itself"));
+    CHECK_THAT(verdict(description_with("<Integer Name=\"PtpOffsetFromMaster\"><Value>3</Value>"
+                                        "</Integer>" +
+                                        loop)),
+               Catch::Contains("leads back to itself"));
+    CHECK_THAT(verdict(description_with(
+                   "<IntReg Name=\"Width\"><Length>4</Length><pIndex\n pOffset =\n'Width'>B"
+                   "</pIndex></IntReg>")),
+               Catch::Contains("leads back to itself"));
+}
+
 TEST_CASE("description_check: what is no whole description is refused") {
     const std::string honest = rig::gige_xml(640, 480);
     CHECK(verdict("") == "is cut off");
