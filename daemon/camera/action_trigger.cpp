@@ -20,10 +20,6 @@ constexpr std::uint8_t flag_acknowledge = 0x01;
 /// Keys and mask, and the time.
 constexpr unsigned action_size = 3 * 4 + 8;
 
-std::uint16_t half_at(std::span<const std::uint8_t> packet, std::size_t at) {
-    return static_cast<std::uint16_t>(packet[at] << 8U | packet[at + 1]);
-}
-
 }  // namespace
 
 std::vector<std::uint8_t> scheduled_action(CameraTime at, std::uint16_t request) {
@@ -40,10 +36,10 @@ std::vector<std::uint8_t> scheduled_action(CameraTime at, std::uint16_t request)
 
 std::optional<std::uint16_t> action_status(std::span<const std::uint8_t> packet,
                                            std::uint16_t request) {
-    if (packet.size() < gvcp_header_size || half_at(packet, 2) != action_acknowledge ||
-        half_at(packet, 6) != request)
+    if (packet.size() < gvcp_header_size || half_at(packet.data() + 2) != action_acknowledge ||
+        half_at(packet.data() + 6) != request)
         return std::nullopt;
-    return half_at(packet, 0);
+    return half_at(packet.data());
 }
 
 std::unique_ptr<ActionTrigger> ActionTrigger::create(in_addr interface, in_addr camera,

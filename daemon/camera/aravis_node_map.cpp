@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -89,6 +90,12 @@ AravisNodeMap::AravisNodeMap(ArvDevice* device)
 ArvGcNode* AravisNodeMap::node(const std::string& feature) const {
     ArvGcNode* node = arv_device_get_feature(device_, feature.c_str());
     return node != nullptr && graph_.lengths_are_constant(feature) ? node : nullptr;
+}
+
+std::string AravisNodeMap::first_of(const std::vector<std::string>& features) const {
+    const auto found = std::find_if(features.begin(), features.end(),
+                                    [&](const std::string& feature) { return has(feature); });
+    return found == features.end() ? "" : *found;
 }
 
 bool AravisNodeMap::is_integer(const std::string& feature) const {

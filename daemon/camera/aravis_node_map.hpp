@@ -51,6 +51,9 @@ class AravisNodeMap final : public NodeMap {
     /// True when the description has it, whether it can be used now or not.
     bool has(const std::string& feature) const { return node(feature) != nullptr; }
 
+    /// The first of the features that the description has; empty: none.
+    std::string first_of(const std::vector<std::string>& features) const;
+
     bool is_integer(const std::string& feature) const;
 
     /// The value of a number; none: it is none, or cannot be read now.

@@ -129,13 +129,6 @@ PresetVariables variables_of(const CameraPreset& preset, const CameraConfigurati
             {"edge", {configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}}};
 }
 
-/// The first of the features that the camera's description has; empty: none.
-std::string first_of(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
-    const auto found = std::find_if(features.begin(), features.end(),
-                                    [&](const std::string& name) { return nodes.has(name); });
-    return found == features.end() ? "" : *found;
-}
-
 /// The first of the features that reads as a number; empty: none.
 std::string first_number(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
     const auto found = std::find_if(features.begin(), features.end(), [&](const std::string& name) {
@@ -146,7 +139,7 @@ std::string first_number(const AravisNodeMap& nodes, const std::vector<std::stri
 
 /// The first of the features that the camera's description has.
 ChunkFeature first_chunk(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
-    const std::string name = first_of(nodes, features);
+    const std::string name = nodes.first_of(features);
     return {name, nodes.is_integer(name)};
 }
 
@@ -239,7 +232,7 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
     setup.stamp_instant = configuration.stamp_instant == pairing::Instant::unknown
                               ? preset->stamp_instant
                               : configuration.stamp_instant;
-    setup.exposure_feature = first_of(nodes, preset->exposure_time);
+    setup.exposure_feature = nodes.first_of(preset->exposure_time);
     setup.chunk_exposure = first_chunk(nodes, preset->chunk_exposure);
     setup.chunk_exposure_unit_us = preset->chunk_exposure_unit_us;
     setup.sensor = {first_number(nodes, preset->gain), first_number(nodes, preset->temperature)};

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <string_view>
 
@@ -201,24 +202,28 @@ Expected<DescriptionGraph::Cost> DescriptionGraph::cost(const std::string& name)
 
 std::string expose_index_offsets(const std::string& text) {
     constexpr std::string_view attribute = "pOffset";
-    // As part of a name, such as PtpOffsetFromMaster, it is none.
-    const auto is_attribute = [&](std::size_t at) {
-        const std::size_t after = text.find_first_not_of(" \t\r\n", at + attribute.size());
-        return at > 0 && std::string_view(" \t\r\n").find(text[at - 1]) != std::string::npos &&
-               after != std::string::npos && text[after] == '=';
+    constexpr std::string_view space = " \t\r\n";
+    // Neither part of a name, such as PtpOffsetFromMaster, nor prose.
+    const auto value_of_attribute = [&](std::size_t at) -> std::optional<std::string> {
+        if (at == 0 || space.find(text[at - 1]) == std::string_view::npos) return std::nullopt;
+        const std::size_t equals = text.find_first_not_of(space, at + attribute.size());
+        if (equals == std::string::npos || text[equals] != '=') return std::nullopt;
+        const std::size_t quote = text.find_first_not_of(space, equals + 1);
+        if (quote == std::string::npos || (text[quote] != '"' && text[quote] != '\''))
+            return std::nullopt;
+        const std::size_t end = text.find_first_of(std::string{text[quote], '<'}, quote + 1);
+        if (end == std::string::npos || text[end] == '<') return std::nullopt;
+        return text.substr(quote + 1, end - quote - 1);
     };
     std::string result;
     std::size_t copied = 0;
     for (std::size_t at = text.find(attribute); at != std::string::npos;
          at = text.find(attribute, at + 1)) {
-        if (!is_attribute(at)) continue;
+        const auto value = value_of_attribute(at);
         const std::size_t element = text.rfind('<', at);
-        const std::size_t from = text.find_first_of("\"'", at);
-        const std::size_t to = from == std::string::npos ? from : text.find(text[from], from + 1);
-        if (to == std::string::npos || element == std::string::npos || element < copied) continue;
+        if (!value || element == std::string::npos) continue;
         result += text.substr(copied, element - copied) +
-                  fmt::format("<pVariable Name=\"{}\">", offset_variable) +
-                  text.substr(from + 1, to - from - 1) + "</pVariable>";
+                  fmt::format("<pVariable Name=\"{}\">{}</pVariable>", offset_variable, *value);
         copied = element;
     }
     return result + text.substr(copied);

@@ -65,10 +65,6 @@ FileDescriptor open_socket(in_addr interface) {
     return socket;
 }
 
-std::uint16_t half_at(const std::uint8_t* bytes) {
-    return static_cast<std::uint16_t>(bytes[0] << 8U | bytes[1]);
-}
-
 std::uint32_t word_at(const std::uint8_t* bytes) {
     return std::uint32_t{half_at(bytes)} << 16U | half_at(bytes + 2);
 }

@@ -26,6 +26,11 @@ inline void put(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned by
     while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
 }
 
+/// A field of two bytes in network order.
+inline std::uint16_t half_at(const std::uint8_t* bytes) {
+    return static_cast<std::uint16_t>(bytes[0] << 8U | bytes[1]);
+}
+
 /// Until a camera that is asked by its address is taken for absent: some answer after a third of a
 /// second.
 constexpr Duration address_patience = seconds(1);

@@ -3,21 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <cstdlib>
-
 #include "camera/gvcp.hpp"
 
 namespace versavis::daemon {
 
 namespace {
-
-/// The first of the names that the camera's description has; empty: none.
-std::string first_of(const AravisNodeMap& nodes, std::initializer_list<const char*> names) {
-    for (const char* name : names)
-        if (nodes.has(name)) return name;
-    return "";
-}
 
 bool execute(ArvDevice* device, const std::string& command) {
     GlibError error;
@@ -36,14 +26,14 @@ std::optional<std::int64_t> integer(ArvDevice* device, const std::string& featur
 
 Expected<PtpReader> PtpReader::create(AravisNodeMap& nodes, const std::string& camera) {
     PtpReader reader(nodes);
-    reader.state_ = first_of(nodes, {"PtpStatus", "GevIEEE1588Status"});
-    reader.latch_data_ = first_of(nodes, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch"});
-    reader.servo_ = first_of(nodes, {"PtpServoStatus"});
-    reader.offset_ = first_of(nodes, {"PtpOffsetFromMaster", "GevIEEE1588OffsetFromMaster"});
+    reader.state_ = nodes.first_of({"PtpStatus", "GevIEEE1588Status"});
+    reader.latch_data_ = nodes.first_of({"PtpDataSetLatch", "GevIEEE1588DataSetLatch"});
+    reader.servo_ = nodes.first_of({"PtpServoStatus"});
+    reader.offset_ = nodes.first_of({"PtpOffsetFromMaster", "GevIEEE1588OffsetFromMaster"});
     reader.grandmaster_ =
-        first_of(nodes, {"PtpGrandmasterClockID", "PtpParentClockID", "GevIEEE1588ParentClockId"});
-    reader.latch_ = first_of(nodes, {"TimestampLatch", "GevTimestampControlLatch"});
-    reader.latched_ = first_of(nodes, {"TimestampLatchValue", "GevTimestampValue"});
+        nodes.first_of({"PtpGrandmasterClockID", "PtpParentClockID", "GevIEEE1588ParentClockId"});
+    reader.latch_ = nodes.first_of({"TimestampLatch", "GevTimestampControlLatch"});
+    reader.latched_ = nodes.first_of({"TimestampLatchValue", "GevTimestampValue"});
     const auto lacks = [&](const char* what) {
         return failure(camera, fmt::format("the camera has no {}", what),
                        "trigger = \"ptp\" needs it: trigger this camera by the board");

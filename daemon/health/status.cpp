@@ -177,12 +177,12 @@ json ptp_clock_json(const CameraStatus& status, const std::optional<PtpReport>& 
                                     [&](const auto& clock) { return clock.name == status.name; });
     if (found == ptp->clocks.end()) return {};
     const PtpStatus& port = found->status;
-    const bool told = found->agreement != clock::Agreement::unknown;
+    const bool known = found->agreement != clock::Agreement::unknown;
     return {{"port", text_or_null(port.state)},
             {"follows", port.follows()},
             {"offset_ns", port.offset ? json(port.offset->ns) : json()},
             {"grandmaster", text_or_null(port.grandmaster)},
-            {"agrees", told ? json(found->agreement == clock::Agreement::agrees) : json()},
+            {"agrees", known ? json(found->agreement == clock::Agreement::agrees) : json()},
             {"readings", found->readings},
             {"readings_differing", found->differing},
             {"reading_width_ns", found->width.ns},

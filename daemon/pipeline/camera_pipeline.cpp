@@ -431,15 +431,15 @@ bool CameraPipeline::wants_clock_reading() {
 
 void CameraPipeline::add_by_ptp(const pairing::Arrival& arrival) {
     const PtpFrames::Account length{event_lengths_.length(arrival.block_id), arrival.exposure};
-    report_.length_by_frame = length.event.ns != 0 || length.chunk.ns != 0;
+    length_by_frame_ = length.event.ns != 0 || length.chunk.ns != 0;
     by_ptp_.add(arrival, length, clocks_->to_host(arrival.camera_time));
     settle_ptp();
     if (by_ptp_.waiting() && reading_wanted_) reading_wanted_();
 }
 
-void CameraPipeline::when_clock_reading_wanted(std::function<void()> told) {
+void CameraPipeline::when_clock_reading_wanted(std::function<void()> callback) {
     const std::lock_guard lock(mutex_);
-    reading_wanted_ = std::move(told);
+    reading_wanted_ = std::move(callback);
 }
 
 void CameraPipeline::settle_ptp() {
@@ -463,11 +463,10 @@ void CameraPipeline::publish_by_ptp(const pairing::Arrival& arrival, const PtpEx
         strobe_.started(*start);
     }
     clocks_->contradict(clock_, strobe_.contradicts(arrival.arrived));
-    if (clocks_->distrusted()) return frame_unpaired(arrival, EventReason::wrong_exposure, nullptr);
+    if (clocks_->distrusted()) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
     const auto middle = clocks_->translate(exposure.middle());
     if (!middle) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
-    if (!frames_.publish_by_ptp(arrival, exposure, *middle,
-                                ptp_status_.offset.value_or(Duration{}))) {
+    if (!frames_.publish_by_ptp(arrival, exposure, *middle, offset)) {
         if (frames_.stuck()) translator_.begin_epoch();
         return frame_unpaired(arrival, EventReason::went_back, nullptr);
     }
@@ -606,7 +605,7 @@ void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
 
 bool CameraPipeline::wants_exposure_readings() {
     const std::lock_guard lock(mutex_);
-    if (by_ptp()) return !report_.length_by_frame;
+    if (by_ptp()) return !length_by_frame_;
     return triggered() && check_.wants_readings();
 }
 

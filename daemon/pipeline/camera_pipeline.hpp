@@ -48,7 +48,6 @@ struct PipelineReport {
     std::uint64_t actions_refused = 0;   ///< triggers by PTP time that the camera did not take ...
     std::uint16_t refusal = 0;           ///< ... and the newest GVCP status of one; 0: none
     std::optional<StrobeReport> strobe;  ///< none: the board does not see its exposures
-    bool length_by_frame = false;        ///< the newest frame said how long it was exposed
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -138,10 +137,12 @@ class CameraPipeline final : private pairing::Outcome {
     /// The exposure line of a camera that is triggered by PTP time became active.
     void line_rose(BoardTime at);
 
-    /// Frames wait until its clock is read. `told`: called when that begins, on any thread, while
-    /// the pipeline is locked; none: nobody is.
+    /// Frames wait until its clock is read.
     bool wants_clock_reading();
-    void when_clock_reading_wanted(std::function<void()> told);
+
+    /// `callback` is called when they begin to wait, on any thread, while the pipeline is locked;
+    /// it may be empty.
+    void when_clock_reading_wanted(std::function<void()> callback);
 
     /// The board sent no trigger for one grid point, and said so.
     void triggers_skipped(std::uint64_t count);
@@ -240,6 +241,7 @@ class CameraPipeline final : private pairing::Outcome {
     PtpFrames by_ptp_;
     StrobeWitness strobe_;
     PtpStatus ptp_status_;
+    bool length_by_frame_ = false;  ///< the newest frame said how long it was exposed
     std::string port_logged_;
     std::uint64_t ptp_steps_ = 0;
     std::function<void()> reading_wanted_;

@@ -107,6 +107,11 @@ TEST_CASE("description_check: a name with pOffset in it is no offset of an index
                                         "</Integer>" +
                                         loop)),
                Catch::Contains("leads back to itself"));
+    for (const char* prose : {"pOffset", "it has pOffset = 3", "it's pOffset = of \"Width",
+                              "\"this\" pOffset = \"is not closed"})
+        CHECK_THAT(verdict(description_with("<Integer Name=\"A\"><ToolTip> " + std::string(prose) +
+                                            "</ToolTip><Value>3</Value></Integer>" + loop)),
+                   Catch::Contains("leads back to itself"));
     CHECK_THAT(verdict(description_with(
                    "<IntReg Name=\"Width\"><Length>4</Length><pIndex\n pOffset =\n'Width'>B"
                    "</pIndex></IntReg>")),

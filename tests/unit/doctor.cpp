@@ -520,8 +520,7 @@ TEST_CASE("doctor: the conclusion is right only with proof, and says which") {
     CHECK(by_ptp(ptp, "unused").state == State::right);
     CHECK_THAT(
         by_ptp(ptp, "unused").sentence,
-        Contains(
-            "sigma is 3.0 us, the bound 20.0 us; frames of 1 camera are stamped by its own clock"));
+        Contains("sigma is 3.0 us, the bound 20.0 us; PTP's time makes the stamps of 1 camera"));
     CHECK(by_ptp({{"state", "init"}, {"sigma_ns", nullptr}}, "unused").state == State::unknown);
     CHECK(by_ptp({{"state", "init"}, {"sigma_ns", nullptr}}, "running").state == State::unknown);
     CHECK(by_ptp(nullptr, "unused").state == State::unknown);

@@ -230,9 +230,7 @@ std::string witnesses(const json& status, const Proof& proof) {
                             proof.measured, counted(proof.cameras));
     if (proof.agreeing > 0) text += fmt::format(", {} report the same", proof.agreeing);
     if (proof.by_ptp > 0)
-        text +=
-            fmt::format("; frames of {} are stamped by its own clock, which agrees with PTP's time",
-                        counted(proof.by_ptp));
+        text += fmt::format("; PTP's time makes the stamps of {}", counted(proof.by_ptp));
     if (status.value("board", json::object()).value("stamp_test", "") == "passed")
         text += "; the board's test of its stamps passes";
     if (status.value("clock", json::object()).value("pps", "") == "used")
