@@ -201,6 +201,23 @@ TEST_CASE("ptp_frames: one trigger has one frame, and a stale stamp does not tak
     CHECK(bench.verdict() == EventReason::mismatch);
 }
 
+TEST_CASE("ptp_frames: a camera that counts one frame more and is later for good is proved again") {
+    PtpCamera bench;
+    for (int i = 0; i < 5; ++i) {
+        bench.frame(bench.trigger());
+        bench.read();
+        REQUIRE(bench.verdict() == EventReason::none);
+    }
+    ++bench.block_id;
+    const auto later = [&] {
+        bench.frame(bench.trigger(), microseconds(30), {}, milliseconds(35));
+        bench.read();
+        return bench.verdict();
+    };
+    for (int i = 0; i < 3; ++i) CHECK(later() == EventReason::mismatch);
+    for (int i = 0; i < 5; ++i) CHECK(later() == EventReason::none);
+}
+
 TEST_CASE("ptp_frames: the arrival bounds the exposure") {
     PtpCamera bench;
     const PtpTrigger trigger = bench.trigger();
