@@ -6,6 +6,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/fail.hpp"
 #include "bridge.hpp"
@@ -18,11 +21,11 @@ using namespace versavis::dds;
 
 volatile sig_atomic_t stop_requested = 0;
 
-int serve(const std::string& instance, const std::string& prefix, const NetworkSettings& network) {
+int serve(BridgeSettings settings, const NetworkSettings& network) {
     const auto participant = Participant::create(network);
     if (!participant) return client::fail(participant.error());
-    Bridge bridge(*participant, instance, prefix);
-    fmt::print("publishing instance '{}' in domain {}\n", instance, network.domain);
+    fmt::print("publishing instance '{}' in domain {}\n", settings.instance, network.domain);
+    Bridge bridge(*participant, std::move(settings));
     std::fflush(stdout);
     for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     while (stop_requested == 0)
@@ -39,11 +42,14 @@ int serve(const std::string& instance, const std::string& prefix, const NetworkS
 int main(int argc, char** argv) {
     CLI::App app{"Publishes what the service publishes as topics of ROS 2, by DDS."};
     app.set_version_flag("--version", "versavis-dds " VERSAVIS_VERSION);
-    std::string instance = default_instance();
-    std::string prefix;
+    BridgeSettings settings{default_instance(), ""};
+    std::vector<std::string> calibrations;
     NetworkSettings network;
-    app.add_option("--instance", instance, "Of the service")->capture_default_str();
-    app.add_option("--prefix", prefix, "In front of all topics but /diagnostics, as /car");
+    app.add_option("--instance", settings.instance, "Of the service")->capture_default_str();
+    app.add_option("--prefix", settings.prefix, "In front of all topics but /diagnostics, as /car");
+    app.add_option("--calibration", calibrations,
+                   "Kalibr's camchain.yaml, for the camera infos; may be repeated")
+        ->allow_extra_args(false);
     app.add_option("--domain", network.domain, "Of DDS, as ROS 2 has it")
         ->capture_default_str()
         ->envname("ROS_DOMAIN_ID");
@@ -55,5 +61,9 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
-    return serve(instance, prefix, network);
+    auto lenses = client::read_lenses(calibrations);
+    if (!lenses) return client::fail(lenses.error(), EX_NOINPUT);
+    for (const std::string& why : lenses->left_out) fmt::print(stderr, "{}\n", why);
+    settings.lenses = std::move(*lenses);
+    return serve(std::move(settings), network);
 }

@@ -26,7 +26,7 @@ constexpr int kept_images = 10;
 constexpr int kept_messages = 500;
 
 /// SHA-256 of the type's description in JSON (REP 2016).
-constexpr std::array<std::pair<std::string_view, std::string_view>, 8> hashes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 9> hashes{{
     {"sensor_msgs/msg/Image",
      "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"},
     {"sensor_msgs/msg/CompressedImage",
@@ -41,6 +41,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 8> hashes{{
      "RIHS01_72514a14126ab9f8a9abec974c78e5610a367b59db5da355ff1fb982d5bad4b8"},
     {"sensor_msgs/msg/TimeReference",
      "RIHS01_dd66e84cf40bbb5d5a40472e6ecf2675a031334d4c426abdb2ad41801a8efc99"},
+    {"nmea_msgs/msg/Sentence",
+     "RIHS01_67d3d300e23d1d018584731cd9642ffb4c78d12da1f483d3f2be3a9396c40984"},
     {"diagnostic_msgs/msg/DiagnosticArray",
      "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
 }};
@@ -49,7 +51,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 8> hashes{{
 Qos writer_qos(std::string_view type) {
     Qos qos(dds_create_qos(), dds_delete_qos);
     dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, longest_block);
-    const bool images = type == "sensor_msgs/msg/Image";
+    const bool images = type.ends_with("Image");
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, images ? kept_images : kept_messages);
     dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
     const std::string data = fmt::format("typehash={};", type_hash(type));

@@ -97,6 +97,8 @@ void FoxgloveSession::advertise(const std::string& stream, ring::StreamKind kind
         made = {{base + "/data_raw", "sensor_msgs/msg/Imu", stream, Content::imu}};
     if (kind == ring::StreamKind::events)
         made = {{"/versavis/events", client::event_type, stream, Content::event}};
+    if (kind == ring::StreamKind::nmea)
+        made = {{base + "/nmea_sentence", client::sentence_type, stream, Content::sentence}};
     if (kind == ring::StreamKind::status)
         made = {{"/versavis/status", client::text_type, stream, Content::status}};
     json channels = json::array();
@@ -155,6 +157,7 @@ void FoxgloveSession::subscribe(const json& subscriptions) {
                 options.start = Position::oldest;
                 take(EventStream::open(channel.stream, options));
                 break;
+            case ring::StreamKind::nmea: take(NmeaStream::open(channel.stream, options)); break;
             default: take(StatusStream::open(channel.stream, options)); break;
         }
     }
@@ -187,6 +190,11 @@ void FoxgloveSession::report_missed(HostTime now) {
     }
 }
 
+void FoxgloveSession::report_once(Subscription& subscription, const std::string& problem) {
+    if (problem != subscription.problem && !problem.empty()) report(warning, problem);
+    subscription.problem = problem;
+}
+
 std::optional<std::string> FoxgloveSession::next_text(HostTime now) {
     if (searched_ == HostTime{INT64_MIN} || now - searched_ >= look_period) {
         searched_ = now;
@@ -206,9 +214,7 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
     if (channel.content == Content::jpeg) {
         const ShownPicture* shown = data_->picture(stream, true, now);
         if (shown == nullptr) return std::nullopt;
-        if (shown->problem != subscription.problem && !shown->problem.empty())
-            report(warning, shown->problem);
-        subscription.problem = shown->problem;
+        report_once(subscription, shown->problem);
         if (!shown->problem.empty() || shown->version == subscription.version) return std::nullopt;
         subscription.version = shown->version;
         const auto length = static_cast<std::uint32_t>(shown->jpeg.size());
@@ -224,8 +230,12 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
         }
         const OutputTime time = frame->time.output();
         std::string message = message_head(id, time);
-        if (channel.content == Content::camera_info)
-            return message + client::ros_camera_info(time, stream, frame->data);
+        if (channel.content == Content::camera_info) {
+            const client::Lenses& lenses = data_->lenses();
+            report_once(subscription, lenses.misfit(stream, frame->data.width, frame->data.height));
+            return message +
+                   client::ros_camera_info(time, stream, frame->data, lenses.find(stream));
+        }
         if (channel.content == Content::stamp)
             return message +
                    client::note_message(stream, item_of(ring::StreamKind::frames, *frame));
@@ -252,6 +262,13 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
         if (!event) return std::nullopt;
         return message_head(id, event->time.output()) +
                client::note_message(stream, item_of(ring::StreamKind::events, *event));
+    }
+    if (auto* sentences = std::get_if<NmeaStream>(&subscription.reader)) {
+        const auto sentence = sentences->next();
+        std::string text;
+        if (!sentence || !add_payload(text, *sentence)) return std::nullopt;
+        const OutputTime time = sentence->time.output();
+        return message_head(id, time) + client::ros_sentence(time, stream, text);
     }
     const auto status = std::get<StatusStream>(subscription.reader).latest();
     std::string document;

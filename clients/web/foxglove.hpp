@@ -37,20 +37,20 @@ class FoxgloveSession {
     std::optional<std::string> next_message(HostTime now);
 
  private:
-    enum class Content { image, jpeg, camera_info, stamp, imu, event, status };
+    enum class Content { image, jpeg, camera_info, stamp, imu, event, sentence, status };
     struct Channel {
         std::string topic;
         std::string_view type;
         std::string stream;
         Content content;
     };
-    using Reader = std::variant<FrameStream, ImuStream, EventStream, StatusStream>;
+    using Reader = std::variant<FrameStream, ImuStream, EventStream, NmeaStream, StatusStream>;
     struct Subscription {
         const Channel* channel;
         Reader reader;
         std::uint64_t number = 0;   ///< of the frame that was sent last, and 1
         std::uint64_t version = 0;  ///< of the JPEG
-        std::string problem{};      ///< why there is none, as it was reported
+        std::string problem{};      ///< why there is none, or what is wrong, as it was reported
         std::uint64_t missed = 0;
     };
 
@@ -59,6 +59,7 @@ class FoxgloveSession {
     void subscribe(const nlohmann::json& subscriptions);
     void report(int level, const std::string& message);
     void report_missed(HostTime now);
+    void report_once(Subscription& subscription, const std::string& problem);
     std::optional<std::string> message_of(std::uint32_t id, Subscription& subscription,
                                           HostTime now);
 

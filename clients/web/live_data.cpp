@@ -59,7 +59,7 @@ json sigma_of(std::uint32_t sigma_ns) {
     return sigma_ns == sigma_unknown ? json() : json(sigma_ns);
 }
 
-json facts_of(const Frame& frame, const Picture& picture) {
+json facts_of(const Frame& frame, const client::Picture& picture) {
     const SensorState sensor = frame.sensor();
     const auto known = [](float value) { return std::isnan(value) ? json() : json(value); };
     return {{"number", frame.number},
@@ -171,7 +171,7 @@ void LiveData::read_status(HostTime now) {
 void LiveData::advance(HostTime now) {
     if (watched_ == HostTime{INT64_MIN}) return;
     if (now - watched_ > unwatched_after) {
-        *this = LiveData(instance_);
+        *this = LiveData(instance_, std::move(lenses_));
         return;
     }
     if (searched_ == HostTime{INT64_MIN} || now - searched_ >= search_period) {
@@ -255,8 +255,8 @@ const ShownPicture* LiveData::picture(const std::string& name, bool whole, HostT
     if (!frame || (shown.number == frame->number && shown.life == frame->time.life)) return &shown;
     std::vector<std::byte> payload(frame->payload.size());
     if (!frame->payload.copy_to(payload.data())) return &shown;  // overtaken: the next one will do
-    auto picture =
-        make_picture(name, frame->data, payload, whole ? frame->data.width : overview_width);
+    auto picture = client::make_picture(name, frame->data, payload,
+                                        whole ? frame->data.width : overview_width);
     shown.problem = picture ? "" : picture.error().message();
     if (!picture) return &shown;
     ++shown.version;
@@ -275,8 +275,7 @@ Expected<client::WiredParts> LiveData::wiring() const {
     const std::string path = client::text(*status, "configuration");
     auto parts = client::configured_wiring(
         path, [&](const auto& name, const auto&) { return client::preset_of(*status, name); });
-    if (parts && parts->cameras.empty() && parts->imus.empty())
-        return failure(path, "has no camera or IMU at the board");
+    if (parts && parts->empty()) return failure(path, "has no camera, IMU or LiDAR at the board");
     return parts;
 }
 

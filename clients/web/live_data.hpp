@@ -13,6 +13,7 @@
 #include <string>
 
 #include "picture.hpp"
+#include "recording/lenses.hpp"
 #include "versavis/stream.hpp"
 #include "wiring/wired_parts.hpp"
 
@@ -33,7 +34,8 @@ struct ShownPicture {
 
 class LiveData {
  public:
-    explicit LiveData(std::string instance) : instance_(std::move(instance)) {}
+    explicit LiveData(std::string instance, client::Lenses lenses = {})
+        : instance_(std::move(instance)), lenses_(std::move(lenses)) {}
 
     /// Reads what has come. To be called ten times a second; without a client it reads nothing.
     void advance(HostTime now);
@@ -45,12 +47,14 @@ class LiveData {
     /// None: there is no such camera.
     const ShownPicture* picture(const std::string& camera, bool whole, HostTime now);
 
-    /// OpenMetrics.
     /// The circuits of the service's configuration. Errors: it cannot be read; no part is at the
     /// board.
     Expected<client::WiredParts> wiring() const;
 
+    /// OpenMetrics.
     std::string metrics(HostTime now) const;
+
+    const client::Lenses& lenses() const { return lenses_; }
 
  private:
     struct Moment {
@@ -83,6 +87,7 @@ class LiveData {
     nlohmann::json document(HostTime now) const;
 
     std::string instance_;
+    client::Lenses lenses_;
     HostTime watched_{INT64_MIN};  ///< when somebody looked last
     HostTime searched_{INT64_MIN};
     HostTime asked_{INT64_MIN};   ///< for the status

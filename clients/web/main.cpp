@@ -51,7 +51,7 @@ void turn_by_turn(boost::asio::steady_timer& timer, LiveData& data) {
     });
 }
 
-int serve(const Settings& settings) {
+int serve(const Settings& settings, client::Lenses lenses) {
     boost::asio::io_context context(1);
     auto server = Server::listen(context, settings.address, settings.port);
     if (!server) return client::fail(server.error());
@@ -59,7 +59,7 @@ int serve(const Settings& settings) {
         return client::fail({settings.address, "others could look, too",
                              "give --token-file FILE, or only 127.0.0.1"},
                             EX_USAGE);
-    LiveData data(settings.instance);
+    LiveData data(settings.instance, std::move(lenses));
     RecordingProcess recording(settings.instance, settings.record_to);
     server->start(
         {[&](const Request& request) { return respond(request, settings, data, recording); },
@@ -87,6 +87,7 @@ int main(int argc, char** argv) {
     Settings settings;
     settings.instance = default_instance();
     std::string token_file;
+    std::vector<std::string> calibrations;
     app.add_option("--instance", settings.instance, "Of the service")->capture_default_str();
     app.add_option("--address", settings.address, "To listen on; others than loopback need a token")
         ->capture_default_str();
@@ -97,6 +98,9 @@ int main(int argc, char** argv) {
         ->check(CLI::ExistingDirectory);
     app.add_option("--allow-origin", settings.origins,
                    "Whose pages may open WebSockets, as https://app.foxglove.dev");
+    app.add_option("--calibration", calibrations,
+                   "Kalibr's camchain.yaml, for the camera infos of Foxglove; may be repeated")
+        ->allow_extra_args(false);
     app.add_option("--token-file", token_file, "Whoever looks needs the token in this file");
     try {
         app.parse(argc, argv);
@@ -108,5 +112,8 @@ int main(int argc, char** argv) {
         if (!token) return client::fail(token.error(), EX_NOINPUT);
         settings.token = std::move(*token);
     }
-    return serve(settings);
+    auto lenses = client::read_lenses(calibrations);
+    if (!lenses) return client::fail(lenses.error(), EX_NOINPUT);
+    for (const std::string& why : lenses->left_out) fmt::print(stderr, "{}\n", why);
+    return serve(settings, std::move(*lenses));
 }

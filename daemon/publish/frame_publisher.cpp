@@ -36,7 +36,9 @@ FrameMetadata describe(const pairing::Exposure& exposure) {
 }  // namespace
 
 FramePublisher::FramePublisher(const CameraConfiguration& configuration)
-    : name_(configuration.name), slots_(configuration.slots) {}
+    : name_(configuration.name),
+      slots_(configuration.slots),
+      kept_(configuration.history ? 0 : ring::newest_kept) {}
 
 Expected<std::optional<ring::Writer>> FramePublisher::make_ring(const ring::Place& place,
                                                                 std::uint64_t payload_size) const {
@@ -46,7 +48,9 @@ Expected<std::optional<ring::Writer>> FramePublisher::make_ring(const ring::Plac
     shape.kind = ring::StreamKind::frames;
     shape.slot_count = slots_;
     shape.slot_size = payload_size;
-    shape.descriptor_count = std::bit_ceil(std::max(2 * slots_, descriptor_floor));
+    shape.kept = kept_;
+    shape.descriptor_count = kept_ != 0 ? ring::descriptors_of_kept(kept_)
+                                        : std::bit_ceil(std::max(2 * slots_, descriptor_floor));
     auto ring = ring::Writer::create(place, shape);
     if (!ring) return Unexpected(ring.error());
     return std::move(*ring);

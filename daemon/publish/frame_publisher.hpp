@@ -63,6 +63,7 @@ class FramePublisher {
 
     std::string name_;
     std::uint32_t slots_;
+    std::uint32_t kept_;  ///< newest frames; 0: all
     std::optional<ring::Writer> ring_;
     StampGuard guard_;
 };

@@ -108,6 +108,7 @@ struct CameraConfiguration {
     double link_mbps = 0;  ///< of the network link; 0: as the interface says
     unsigned slots = 17;
     double history_s = 0;  ///< frames so old can still be read: part of `slots`
+    bool history = true;   ///< false: only the newest frames stay readable
     unsigned buffers = 6;
     unsigned packet_size = 0;  ///< 0: the largest that passes
     ReceiveMode receive = ReceiveMode::socket;

@@ -187,11 +187,17 @@ void check_outputs(const Configuration& configuration, Findings& findings) {
 }
 
 void check_history(const Configuration& configuration, Findings& findings) {
-    for (const CameraConfiguration& camera : configuration.cameras)
-        if (camera.entry.has("slots") && camera.entry.has("history_s"))
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        if (!camera.entry.has("history_s")) continue;
+        if (camera.entry.has("slots"))
             findings.add(camera.entry, "history_s",
                          "'slots' and 'history_s' both set the size of the ring",
                          "remove one of the two");
+        if (!camera.history)
+            findings.add(camera.entry, "history_s",
+                         "with history = \"none\" no frames are kept for so long",
+                         "remove one of the two");
+    }
 }
 
 bool can_be_master(const CameraConfiguration& camera) {

@@ -26,9 +26,9 @@ constexpr std::string_view named_tables[]{"camera", "imu", "time_output"};
 constexpr std::string_view live_tables[]{"illumination", "ports"};
 
 /// Keys of a camera that its ring, its thread and its place at the board are made by.
-constexpr std::string_view fixed_camera_keys[]{"name",    "device",       "trigger",
-                                               "output",  "strobe_input", "master",
-                                               "buffers", "slots",        "history_s"};
+constexpr std::string_view fixed_camera_keys[]{"name",         "device", "trigger", "output",
+                                               "strobe_input", "master", "buffers", "slots",
+                                               "history_s",    "history"};
 
 template <std::size_t Count>
 bool among(const std::string_view (&names)[Count], std::string_view name) {

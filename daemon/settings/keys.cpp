@@ -349,6 +349,8 @@ Keys<CameraConfiguration> frame_keys() {
          "frames in the ring"},
         {"history_s", number(&Camera::history_s, 0, longest_history_s).also("not with `slots`"),
          "how long frames stay readable"},
+        {"history", choice(&Camera::history, {{"deep", true}, {"none", false}}),
+         "`none`: only the two newest frames stay readable"},
         {"packet_size", number(&Camera::packet_size, 576, 16000).usually("the largest that passes"),
          "GigE Vision packet size, bytes"},
         {"receive",

@@ -36,7 +36,7 @@ class Cable:
 def tables() -> tuple[Table, Table]:
     cables = json.loads((HARDWARE / "cables.json").read_text())
     wiring = json.loads((HARDWARE / "wiring.json").read_text())
-    return cables, {camera["name"]: camera for camera in wiring["cameras"]}
+    return cables, {row["name"]: row for row in [*wiring["cameras"], *wiring["lidars"]]}
 
 
 def camera_facts(row: Table, wiring: Table) -> tuple[Table, Table]:
@@ -64,12 +64,17 @@ def given(level: str, milliamps: float) -> float:
 
 
 def trigger_faults(row: Table, into: Table) -> list[str]:
-    faults, level = [], row["level"]
-    _, most, inside = RAILS[level]
     if into.get("high_v") is None:
         return [] if not row["known"] else ["its input's levels are not known"]
+    return input_faults(row["level"], into)
+
+
+def input_faults(level: str, into: Table) -> list[str]:
+    """Of an input at an output of the carrier; where no level is known, of what it bears."""
+    faults: list[str] = []
+    _, most, inside = RAILS[level]
     milliamps = into.get("draws_ma", into.get("needs_ma", 0.1))
-    if given(level, milliamps) < into["high_v"]:
+    if "high_v" in into and given(level, milliamps) < into["high_v"]:
         faults.append(f"{given(level, milliamps):.2f} V arrive at {milliamps:g} mA, "
                       f"{into['high_v']:g} V are high")
     if most > into["highest_v"]:
@@ -147,15 +152,10 @@ def shared_pins(table: Table) -> list[str]:
             {"trigger", "exposure"} & set(connector["pins"].values())]
 
 
-def lidar_faults(row: Table) -> list[str]:
-    pps, level = row["pps"], row["level"]
-    faults = []
-    if "high_v" in pps and given(level, pps["needs_ma"]) < pps["high_v"]:
-        faults.append(f"{given(level, pps['needs_ma']):.2f} V arrive at {pps['needs_ma']:g} mA, "
-                      f"{pps['high_v']:g} V are high")
-    if RAILS[level][1] > pps["highest_v"]:
-        faults.append(f"{RAILS[level][1]:g} V arrive, the input bears {pps['highest_v']:g} V")
-    return faults
+def lidar_faults(row: Table, wiring: Table) -> list[str]:
+    lidar = wiring[row["name"]]
+    return [f"{line}: {fault}" for line in ("pulse", "serial")
+            for fault in input_faults(row["level"], lidar[line]["input"])]
 
 
 def other_faults(row: Table, table: Table) -> list[str]:
@@ -179,7 +179,8 @@ def faults(table: Table, wiring: Table) -> list[str]:
                   [*trigger_faults(row, into), *exposure_faults(row, output),
                    *pin_faults(row, wiring)]]
     for row in table["others"]:
-        wrong = lidar_faults(row) if row["at"] == "lidar" else other_faults(row, table)
+        wrong = (lidar_faults(row, wiring) if row["at"] == "lidar"
+                 else other_faults(row, table))
         found += [f"{row['name']}: {fault}" for fault in wrong]
     return found + [f"{name} of wiring.json has no cable" for name in wiring
-                    if name not in {row["name"] for row in table["cameras"]}]
+                    if name not in {row["name"] for row in [*table["cameras"], *table["others"]]}]

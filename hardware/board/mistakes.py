@@ -239,6 +239,12 @@ def trigger_input(name: str, **facts: object) -> Change:
     return change
 
 
+def lidar_input(name: str, line: str, **facts: object) -> Change:
+    def change(_: cables.Table, wiring: cables.Table) -> None:
+        wiring[name][line]["input"] = facts
+    return change
+
+
 def supply_beside(table: cables.Table, _: cables.Table) -> None:
     table["connectors"]["camera"]["pins"]["4"] = "supply"
 
@@ -260,9 +266,10 @@ CABLES: tuple[tuple[str, Change], ...] = (
     ("daheng: its pull-up leaves", trigger_input(
         "daheng", kind="direct", high_v=1.9, low_v=0.1, highest_v=24,
         pulls_up={"v": 3.3, "ohm": 1000})),
-    ("velodyne: 3.03 V arrive", cable("velodyne", level="3.3 V", pps={
-        "high_v": 3.1, "needs_ma": 2, "highest_v": 15})),
-    ("livox: 5.25 V arrive, the input bears 3.6 V", cable("livox", level="5 V")),
+    ("velodyne: serial: 4.06 V arrive", lidar_input(
+        "velodyne", "serial", kind="direct", high_v=4.1, needs_ma=2, highest_v=15)),
+    ("ouster: pulse: 2.36 V arrive at 10 mA", cable("ouster", level="3.3 V")),
+    ("livox: pulse: 5.25 V arrive, the input bears 3.6 V", cable("livox", level="5 V")),
     ("u-blox: gives 1.8 V, 2.2 V are high", cable("u-blox", gives_v=[1.8, 1.8])),
     ("vn100: serial is no pin of imu_uart", cable("vn100", wires={"serial": "RX"})),
     ("camera: supply and a signal are on one connector", supply_beside),

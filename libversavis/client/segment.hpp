@@ -66,8 +66,9 @@ class Mapping {
     static Expected<Mapping> open_unchecked(int file, const std::filesystem::path& path,
                                             Access access);
 
-    /// Has all pages at hand, so that none is waited for when it is first touched. `path` is for
-    /// messages. Errors: the memory for them is not there.
+    /// Has all pages at hand, so that none is waited for when it is first touched; a writer's are
+    /// huge ones where the kernel gives them. `path` is for messages. Errors: the memory for them
+    /// is not there.
     Expected<> populate(const std::filesystem::path& path) const;
 
     /// What stays for a reader that lets go of a segment: its constants, the last words of its

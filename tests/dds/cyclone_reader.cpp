@@ -50,8 +50,23 @@ json to_json(const sensor_msgs_msg_dds__Imu_& sample) {
             {"orientation_known", sample.orientation_covariance_[0] >= 0}};
 }
 
+json to_json(const sensor_msgs_msg_dds__CompressedImage_& image) {
+    const std::uint32_t size = image.data_._length;
+    std::string text(2 * size + 1, '\0');
+    sodium_bin2hex(text.data(), text.size(), image.data_._buffer, size);
+    text.pop_back();
+    return {{"header", stamp(image.header_)}, {"format", image.format_}, {"data", text}};
+}
+
 json to_json(const sensor_msgs_msg_dds__CameraInfo_& info) {
-    return {{"header", stamp(info.header_)}, {"height", info.height_}, {"width", info.width_}};
+    const auto* d = info.d_._buffer;
+    return {{"header", stamp(info.header_)},
+            {"height", info.height_},
+            {"width", info.width_},
+            {"model", info.distortion_model_},
+            {"d", std::vector<double>(d, d + info.d_._length)},
+            {"k", info.k_},
+            {"p", info.p_}};
 }
 
 json to_json(const diagnostic_msgs_msg_dds__DiagnosticArray_& array) {
@@ -144,6 +159,9 @@ int main(int argc, char** argv) {
         topics.push_back(open<sensor_msgs_msg_dds__CameraInfo_>(
             participant, prefix + camera + "/camera_info", sensor_msgs_msg_dds__CameraInfo__desc));
     }
+    topics.push_back(open<sensor_msgs_msg_dds__CompressedImage_>(
+        participant, prefix + "/cam1/image_raw/compressed",
+        sensor_msgs_msg_dds__CompressedImage__desc));
     topics.push_back(open<sensor_msgs_msg_dds__Imu_>(participant, prefix + "/imu0/data_raw",
                                                      sensor_msgs_msg_dds__Imu__desc));
     topics.push_back(open<diagnostic_msgs_msg_dds__DiagnosticArray_>(

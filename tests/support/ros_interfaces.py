@@ -31,6 +31,11 @@ INTERFACES = {
         "sensor_msgs/msg/MagneticField": "header std_msgs/msg/Header, "
         "magnetic_field geometry_msgs/msg/Vector3, magnetic_field_covariance float64[9]",
         **HEADER, **VECTORS},
+    "sensor_msgs/msg/CompressedImage": {
+        "sensor_msgs/msg/CompressedImage": "header std_msgs/msg/Header, format string, "
+        "data uint8[]", **HEADER},
+    "nmea_msgs/msg/Sentence": {
+        "nmea_msgs/msg/Sentence": "header std_msgs/msg/Header, sentence string", **HEADER},
     "diagnostic_msgs/msg/DiagnosticArray": {
         "diagnostic_msgs/msg/DiagnosticArray": "header std_msgs/msg/Header, "
         "status diagnostic_msgs/msg/DiagnosticStatus[]",

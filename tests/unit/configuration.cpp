@@ -308,6 +308,8 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
           "4:13: 'history_s' must be a number from 0 to 3600 s, but is -1" + see_manual},
          {"slots = 20\nhistory_s = 1\n",
           "5:13: 'slots' and 'history_s' both set the size of the ring; remove one of the two"},
+         {"history = \"none\"\nhistory_s = 1\n",
+          "5:13: with history = \"none\" no frames are kept for so long; remove one of the two"},
          {"slots = 10\n",
           "4:9: 'slots' must be a whole number from 14 to 1024, but is 10" + see_manual},
          {"strobe_rising_us = [36, 9]\n",

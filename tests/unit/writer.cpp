@@ -12,9 +12,15 @@
 #include <catch2/catch.hpp>
 #include <cerrno>
 #include <csignal>
+#include <cstring>
+#include <deque>
 #include <fstream>
 #include <iterator>
+#include <random>
+#include <set>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "../support/in_process.hpp"
 #include "../support/look.hpp"
@@ -69,6 +75,33 @@ void look_in_between(int) {
     ::mprotect(during_publication.page, page_size, PROT_READ);
 }
 
+/// Bytes that mappings of files with this in their names have as huge pages.
+std::uint64_t huge_memory(const std::string& name) {
+    std::ifstream maps("/proc/self/smaps");
+    std::uint64_t sum = 0;
+    bool own = false;
+    for (std::string line; std::getline(maps, line);) {
+        std::istringstream words(line);
+        std::string first;
+        words >> first;
+        if (first.back() != ':') own = line.find(name) != std::string::npos;
+        std::uint64_t kib = 0;
+        if (own && first == "ShmemPmdMapped:" && words >> kib) sum += kib << 10U;
+    }
+    return sum;
+}
+
+bool kernel_gives_huge_pages() {
+    constexpr std::size_t size = 4 << 20U;
+    constexpr int collapse = 25;
+    void* memory = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    std::memset(memory, 1, size);
+    const auto at = (reinterpret_cast<std::uintptr_t>(memory) + size / 2 - 1) / (size / 2);
+    const bool given = ::madvise(reinterpret_cast<void*>(at * (size / 2)), size / 2, collapse) == 0;
+    ::munmap(memory, size);
+    return given;
+}
+
 std::uint64_t life_of(const std::filesystem::path& path) {
     return Mapping::open(path, Mapping::Access::read_only)->constants().life;
 }
@@ -104,6 +137,95 @@ TEST_CASE_METHOD(Memory, "writer: while an item is written, its descriptor says 
         writer.publish({}, *static_cast<const Metadata*>(during_publication.page));
         return during_publication.seen == 2 * 9 + 1 && *during_publication.sequence == 2 * 9 + 2;
     }));
+}
+
+TEST_CASE_METHOD(Memory, "writer: without history, the memory that was used last is used again") {
+    Writer writer = *Writer::create(
+        directory.path(), {"hot", StreamKind::frames, 4, 12, page_size, 0, 0, newest_kept});
+    const unsigned ahead = GENERATE(0U, 1U, 3U);  // slots that are being filled meanwhile
+    std::deque<std::uint32_t> filling;
+    std::set<std::uint32_t> used;
+    for (unsigned i = 0; i < ahead; ++i) filling.push_back(*writer.acquire());
+    for (int i = 0; i < 50; ++i) {
+        filling.push_back(*writer.acquire());
+        used.insert(filling.front());
+        writer.publish(filling.front(), 1, {}, {});
+        filling.pop_front();
+    }
+    CHECK(used.size() == ahead + 1 + newest_kept);
+    const std::uint32_t slot = *writer.acquire();
+    writer.abandon(slot);
+    CHECK(writer.acquire() == slot);
+}
+
+TEST_CASE_METHOD(Memory, "writer: without history, readers have the newest items whole") {
+    constexpr std::uint32_t slots = 8;
+    std::mt19937 random(GENERATE(range(1U, 9U)));
+    Writer writer = *Writer::create(
+        directory.path(), {"hot", StreamKind::frames, descriptors_of_kept(newest_kept), slots,
+                           page_size, 0, 0, newest_kept});
+    std::vector<std::uint32_t> filling;
+    unsigned published = 0;
+    for (int i = 0; i < 2000; ++i) {
+        if (filling.size() < slots - newest_kept && random() % 2 == 0) {
+            filling.push_back(*writer.acquire());
+            std::memset(writer.slot_data(filling.back()), 0xFF, page_size);
+        } else if (!filling.empty()) {
+            const auto which = filling.begin() + random() % filling.size();
+            const std::uint32_t slot = *which;
+            filling.erase(which);
+            if (random() % 4 == 0) {
+                writer.abandon(slot);
+            } else {
+                std::memcpy(writer.slot_data(slot), &published, sizeof published);
+                writer.publish(slot, sizeof published, {static_cast<std::int64_t>(published)}, {});
+                ++published;
+            }
+        }
+        auto reader = Reader::open(path("hot"), {Position::oldest});
+        unsigned read = 0;
+        for (auto item = test::look(reader->next()); item.found != test::Found::nothing; ++read) {
+            REQUIRE(item.found == test::Found::item);
+            std::uint32_t content = 0;
+            REQUIRE(item.payload.copy_to(reinterpret_cast<std::byte*>(&content)));
+            REQUIRE(content == item.time.ns);
+            item = test::look(reader->next());
+            REQUIRE((item.found == test::Found::item) == (content + 1 < published));
+        }
+        REQUIRE(read >= std::min(published, newest_kept));
+    }
+    REQUIRE(published > 100);
+}
+
+TEST_CASE_METHOD(Memory, "writer: without history, who comes late loses all but the newest") {
+    Writer writer = *Writer::create(directory.path(),
+                                    {"hot", StreamKind::frames, descriptors_of_kept(newest_kept), 8,
+                                     page_size, 0, 0, newest_kept});
+    auto reader = Reader::open(path("hot"), {Position::next});
+    const std::uint64_t count = GENERATE(4U, 5U, 50U);
+    for (std::uint64_t i = 0; i < count; ++i) writer.publish(*writer.acquire(), 1, {}, {});
+    std::uint64_t lost = 0;
+    std::uint64_t read = 0;
+    for (auto item = test::look(reader->next()); item.found != test::Found::nothing;
+         item = test::look(reader->next())) {
+        lost += item.lost;
+        if (item.found == test::Found::item) ++read;
+    }
+    CHECK(read == newest_kept);
+    CHECK(lost == count - newest_kept);
+}
+
+TEST_CASE_METHOD(Memory, "writer: large rings have huge pages, if the kernel gives them") {
+    constexpr std::uint64_t slot = 3 << 20U;
+    const bool sealed = GENERATE(false, true);
+    const auto writer =
+        Writer::create({directory.path(), sealed}, {"large", StreamKind::frames, 8, 8, slot});
+    REQUIRE(writer);
+    const std::uint64_t of_writer = huge_memory("large");
+    const auto reader = Reader::open(path("large"));
+    REQUIRE(reader);
+    CHECK(huge_memory("large") == 2 * of_writer);
+    if (kernel_gives_huge_pages()) CHECK(of_writer > 0);  // of some memory it may have none
 }
 
 TEST_CASE_METHOD(Memory, "writer: what lies under its temporary name is not used") {

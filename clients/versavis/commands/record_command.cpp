@@ -78,6 +78,7 @@ nlohmann::ordered_json report_json(const RecordReport& report) {
                                     {"pairing_slips", report.slips},
                                     {"streams", streams},
                                     {"left_out", report.left_out},
+                                    {"not_in_camera_info", report.not_in_camera_info},
                                     {"begins_late_s", late_begins(report)}};
     document["stopped_early"] = report.stopped_early
                                     ? nlohmann::ordered_json(report.stopped_early->message())
@@ -121,6 +122,8 @@ std::string to_text(const RecordReport& report, bool json) {
             "more (history_s)\n",
             name, late);
     for (const std::string& why : report.left_out) text += "not recorded: " + why + "\n";
+    for (const std::string& why : report.not_in_camera_info)
+        text += "attached, but not in camera infos: " + why + "\n";
     if (report.stopped_early)
         text += fmt::format("stopped early: {}\n", report.stopped_early->message());
     return text;

@@ -46,9 +46,14 @@ class Presets {
 };
 
 bool are_circuits(const std::vector<std::string>& names) {
-    return !names.empty() && std::all_of(names.begin(), names.end(), [](const auto& name) {
-        return circuits().camera(name) != nullptr || circuits().imu(name) != nullptr;
-    });
+    return !names.empty() && std::all_of(names.begin(), names.end(),
+                                         [](const auto& name) { return circuits().has(name); });
+}
+
+/// Whether parts of the configuration have these names, as circuits have.
+bool has_parts(const std::string& path, const std::vector<std::string>& names) {
+    auto parts = configured_wiring(path, [](const auto&, const auto&) { return std::string(); });
+    return parts && only(std::move(*parts), names);
 }
 
 }  // namespace
@@ -56,11 +61,12 @@ bool are_circuits(const std::vector<std::string>& names) {
 WiringCommand::WiringCommand(CLI::App& app)
     : command_(app.add_subcommand(
           "wiring",
-          "Show how to connect the cameras and IMUs of the configuration to the board, pin by pin, "
-          "with levels and warnings. The circuits follow the manufacturers' figures and are not "
+          "Show how to connect the cameras, IMUs and LiDARs of the configuration to the board, pin "
+          "by pin, with levels and warnings. The circuits follow the manufacturers' figures and "
+          "are not "
           "tried on hardware (docs/user/wiring.md)")) {
     command_->add_option("name", names_,
-                         "Only these cameras and IMUs; or circuits by name, without a "
+                         "Only these parts; or circuits by name, without a "
                          "configuration");
     command_->add_option("--config", configuration_,
                          "Configuration file of the service (default: the one that it has read)");
@@ -71,10 +77,11 @@ WiringCommand::WiringCommand(CLI::App& app)
 }
 
 Expected<WiredParts> WiringCommand::parts(const std::string& instance) const {
-    if (configuration_.empty() && are_circuits(names_)) return named_wiring(names_);
     std::optional<json> status;
     if (auto read = read_status(instance)) status = std::move(*read);
     const std::string path = configuration_path(configuration_, status);
+    if (configuration_.empty() && are_circuits(names_) && !has_parts(path, names_))
+        return named_wiring(names_);
     // Of a file with errors no wire is certain; the service says what is wrong with it.
     const auto checked = run_versavisd({"--check-config", "--config", path});
     if (!checked) return Unexpected(checked.error());
@@ -84,8 +91,8 @@ Expected<WiredParts> WiringCommand::parts(const std::string& instance) const {
     auto all = configured_wiring(
         path, [&](const auto& name, const auto& device) { return presets.of(name, device); });
     if (!all) return all;
-    if (all->cameras.empty() && all->imus.empty())
-        return failure(path, "has no camera or IMU at the board",
+    if (all->empty())
+        return failure(path, "has no camera, IMU or LiDAR at the board",
                        "write one with 'versavis init', or name a circuit: 'versavis wiring "
                        "--list'");
     return only(std::move(*all), names_);
@@ -100,6 +107,9 @@ Expected<> WiringCommand::write_pictures(const std::string& directory) const {
         if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
             return done;
     for (const ImuCircuit& circuit : circuits().imus)
+        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
+            return done;
+    for (const LidarCircuit& circuit : circuits().lidars)
         if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
             return done;
     if (auto done = write("driven", {driven_outputs_drawing()}); !done) return done;
@@ -124,7 +134,8 @@ int WiringCommand::run(const std::string& instance) const {
     fmt::print("{}", json_ ? wiring_json(*wired).dump() + "\n" : wiring_text(*wired));
     const auto known = [](const auto& part) { return part.circuit != nullptr; };
     const bool all = std::all_of(wired->cameras.begin(), wired->cameras.end(), known) &&
-                     std::all_of(wired->imus.begin(), wired->imus.end(), known);
+                     std::all_of(wired->imus.begin(), wired->imus.end(), known) &&
+                     std::all_of(wired->lidars.begin(), wired->lidars.end(), known);
     return all ? EX_OK : EXIT_FAILURE;
 }
 

@@ -132,11 +132,10 @@ void ItemWriter::write_frame_notes(Channels& channels, const std::string& stream
     file_.write({channel(channels, stream, own_topic(stream, "/stamp"), stamp_type),
                  channels.sequence, item.time.ns},
                 note_message(stream, item));
-    const auto lens = lenses_.find(stream);
     file_.write(
         {channel(channels, stream, ros_topic(stream, "/camera_info"), "sensor_msgs/msg/CameraInfo"),
          channels.sequence, item.time.ns},
-        ros_camera_info(item.time, stream, frame, lens == lenses_.end() ? nullptr : &lens->second));
+        ros_camera_info(item.time, stream, frame, lenses_.find(stream)));
 }
 
 void ItemWriter::write_imu(Channels& channels, const std::string& stream, const ring::Item& item) {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "recording/item_messages.hpp"
+#include "recording/lenses.hpp"
 #include "recording/mcap_writer.hpp"
-#include "recording/ros_messages.hpp"
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
 #include "versavis/ring_reader.hpp"
@@ -27,7 +27,7 @@ const char* to_string(GapReason reason);
 class ItemWriter {
  public:
     /// `lenses`: of the cameras of which they are known.
-    explicit ItemWriter(McapWriter file, std::map<std::string, RosLens> lenses = {})
+    explicit ItemWriter(McapWriter file, Lenses lenses = {})
         : file_(std::move(file)), lenses_(std::move(lenses)) {}
 
     /// What came of an item.
@@ -71,7 +71,7 @@ class ItemWriter {
                       const std::string& document);
 
     McapWriter file_;
-    std::map<std::string, RosLens> lenses_;
+    Lenses lenses_;
     std::map<std::string, Channels> streams_;
 };
 

@@ -24,7 +24,7 @@
 #include "record/png_encoder.hpp"
 #include "record/write_back.hpp"
 #include "recording/bag_metadata.hpp"
-#include "recording/kalibr_yaml.hpp"
+#include "recording/lenses.hpp"
 #include "status/status_document.hpp"
 #include "versavis/ring_path.hpp"
 #include "versavis/ring_reader.hpp"
@@ -155,7 +155,6 @@ class Recorder {
     Expected<> open_streams();
     Expected<> open_stream(const std::string& name, ring::Position start);
     Expected<> read_calibration();
-    Expected<> read_lenses(const std::string& camchain, const std::string& path);
     Expected<> choose_file();
     Expected<> describe_folder() const;
     void go_back();
@@ -191,7 +190,7 @@ class Recorder {
     WriteBack write_back_;
     std::optional<TaskQueue<PngFrame>> png_frames_;
     std::vector<Content> attachments_;
-    std::map<std::string, RosLens> lenses_;
+    Lenses lenses_;
     std::map<std::string, std::uint64_t> in_chunk_;  ///< items in the chunk that is open
     HostTime begun_;
     HostTime file_begun_;
@@ -271,48 +270,21 @@ void Recorder::look_for_streams() {
     if (found) wait_for_streams();
 }
 
-/// None: CameraInfo has no name for it.
-std::optional<RosLens> lens_of(const CalibratedCamera& camera) {
-    const std::vector<double>& of = camera.intrinsics;
-    RosLens lens{camera.width, camera.height, of[0], of[1], of[2], of[3], {}, camera.coefficients};
-    if (camera.model != "pinhole") return std::nullopt;
-    if (camera.distortion == "none") lens.coefficients.resize(4);
-    if (lens.coefficients.size() != 4) return std::nullopt;
-    if (camera.distortion == "equidistant") {
-        lens.distortion = "equidistant";
-    } else if (camera.distortion == "radtan" || camera.distortion == "none") {
-        lens.distortion = "plumb_bob";
-        lens.coefficients.push_back(0);  // k3
-    } else {
-        return std::nullopt;
-    }
-    return lens;
-}
-
-/// Cameras are named by their topics.
-Expected<> Recorder::read_lenses(const std::string& camchain, const std::string& path) {
-    const auto cameras = parse_camchain(camchain, path);
-    if (!cameras) return Unexpected(cameras.error());
-    for (const CalibratedCamera& camera : *cameras) {
-        const std::size_t end = camera.topic.find('/', 1);
-        const auto lens = lens_of(camera);
-        if (lens && end != std::string::npos) lenses_[camera.topic.substr(1, end - 1)] = *lens;
-    }
-    return {};
-}
-
 Expected<> Recorder::read_calibration() {
     for (const std::string& path : settings_.calibration) {
-        std::ifstream file(path, std::ios::binary);
-        if (!file || std::filesystem::is_directory(path))
-            return failure(path, "cannot be read", "give calibration files that Kalibr wrote");
-        std::string bytes{std::istreambuf_iterator<char>(file), {}};
-        const bool imu = bytes.find("rostopic") != std::string::npos &&
-                         bytes.find("gyroscope_noise_density") != std::string::npos;
-        if (!imu)
-            if (auto read = read_lenses(bytes, path); !read) return read;
+        auto text = read_kalibr_file(path);
+        if (!text) return Unexpected(text.error());
+        const bool imu = text->find("rostopic") != std::string::npos &&
+                         text->find("gyroscope_noise_density") != std::string::npos;
+        if (!imu) {
+            auto lenses = parse_lenses(*text, path);
+            if (!lenses) return Unexpected(lenses.error());
+            report_.not_in_camera_info.insert(report_.not_in_camera_info.end(),
+                                              lenses->left_out.begin(), lenses->left_out.end());
+            lenses_.add(std::move(*lenses));
+        }
         attachments_.push_back({imu ? "calibration/imu.yaml" : "calibration/camchain.yaml",
-                                "application/yaml", std::move(bytes)});
+                                "application/yaml", std::move(*text)});
     }
     return {};
 }

@@ -30,10 +30,11 @@ struct RecordReport {
     std::uint64_t bytes = 0;
     Duration duration;
     std::map<std::string, StreamReport> streams;
-    std::uint64_t slips = 0;             ///< of the pairing, by events
-    std::vector<std::string> left_out;   ///< streams that could not be read, and why
-    std::optional<OutputTime> from;      ///< where `before` wanted it to begin
-    std::optional<Error> stopped_early;  ///< the disk's; what was written before is good
+    std::uint64_t slips = 0;                      ///< of the pairing, by events
+    std::vector<std::string> not_in_camera_info;  ///< calibrated cameras, and why
+    std::vector<std::string> left_out;            ///< streams that could not be read, and why
+    std::optional<OutputTime> from;               ///< where `before` wanted it to begin
+    std::optional<Error> stopped_early;           ///< the disk's; what was written before is good
 
     std::uint64_t items() const;
     std::uint64_t lost() const;

@@ -13,7 +13,7 @@ namespace versavis::client {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(CameraInput, kind, high_v, needs_ma, draws_ma,
                                                 highest_v)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(CameraOutput, kind, high_v, sinks_ma)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Driver, name, rail, enable)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Driver, name, rail, ties)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(TriggerCircuit, driver, series_ohm, rest, rest_ohm,
                                                 gates)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ExposureCircuit, pull_up_ohm, divider_ohm, buffer)
@@ -26,11 +26,13 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(CameraCircuit, name, title, pres
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ImuWire, imu, board, series_ohm, pull_up_ohm)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ImuCircuit, name, title, models, bus, source, wires,
                                                 notes)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(LidarCircuit, name, title, model, source, connector,
+                                                ground, pulse, serial, notes, unknown)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(DrivenOutput, title, output, circuit)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BoardPin, gpio, pin)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Rail, pin)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BoardPins, name, ground_pin, rails, signals)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Circuits, board, drivers, cameras, imus,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Circuits, board, drivers, cameras, imus, lidars,
                                                 driven_outputs)
 
 namespace {
@@ -64,6 +66,10 @@ const Circuits& circuits() {
 const Driver* Circuits::driver(const std::string& name) const { return find(drivers, name); }
 const CameraCircuit* Circuits::camera(const std::string& name) const { return find(cameras, name); }
 const ImuCircuit* Circuits::imu(const std::string& name) const { return find(imus, name); }
+const LidarCircuit* Circuits::lidar(const std::string& name) const { return find(lidars, name); }
+bool Circuits::has(const std::string& name) const {
+    return camera(name) != nullptr || imu(name) != nullptr || lidar(name) != nullptr;
+}
 
 std::string ohms(int value) {
     return value >= 1000 ? fmt::format("{:g} k", value / 1000.0) : fmt::format("{} ohm", value);
@@ -73,7 +79,9 @@ std::string figures(const CameraInput& input) {
     std::vector<std::string> parts;
     if (input.high_v > 0) parts.push_back(fmt::format("above {:g} V", input.high_v));
     if (input.needs_ma >= least_ma)
-        parts.push_back(fmt::format("{:g} to {:g} mA", input.needs_ma, input.draws_ma));
+        parts.push_back(input.draws_ma > input.needs_ma
+                            ? fmt::format("{:g} to {:g} mA", input.needs_ma, input.draws_ma)
+                            : fmt::format("{:g} mA", input.needs_ma));
     if (input.highest_v > 0) parts.push_back(fmt::format("up to {:g} V", input.highest_v));
     return joined(input.kind + " in", parts);
 }

@@ -34,7 +34,7 @@ struct CameraOutput {
 struct Driver {
     std::string name;
     std::string rail;
-    bool enable = false;  ///< it has an /OE
+    std::string ties;  ///< of its other pins; empty: none
 };
 
 struct TriggerCircuit {
@@ -103,6 +103,20 @@ struct ImuCircuit {
     std::vector<std::string> notes;
 };
 
+/// Pulses and sentences of a time output, into two inputs.
+struct LidarCircuit {
+    std::string name;
+    std::string title;
+    std::string model;  ///< of [[time_output]]
+    std::string source;
+    std::string connector;
+    std::string ground;
+    TriggerWiring pulse;
+    TriggerWiring serial;
+    std::vector<std::string> notes;
+    std::string unknown;
+};
+
 /// An output that drives its high level by itself.
 struct DrivenOutput {
     std::string title;
@@ -131,11 +145,16 @@ struct Circuits {
     std::vector<Driver> drivers;
     std::vector<CameraCircuit> cameras;
     std::vector<ImuCircuit> imus;
+    std::vector<LidarCircuit> lidars;
     std::vector<DrivenOutput> driven_outputs;
 
     const Driver* driver(const std::string& name) const;
     const CameraCircuit* camera(const std::string& name) const;
     const ImuCircuit* imu(const std::string& name) const;
+    const LidarCircuit* lidar(const std::string& name) const;
+
+    /// Of any kind.
+    bool has(const std::string& name) const;
 };
 
 /// The table itself.

@@ -89,6 +89,41 @@ WiredImu configured_imu(const toml::table& table) {
     return imu;
 }
 
+WiredLidar configured_lidar(const toml::table& table) {
+    WiredLidar lidar;
+    lidar.name = text(table, "name", "lidar");
+    const std::string output = text(table, "output", "sync");
+    lidar.output = output == "sync" || output == "test" ? output + "_output" : output;
+    lidar.pulse_inverted = table["pulse_inverted"].value_or(false);
+    if (const auto* sentences = table["sentences"].as_array())
+        lidar.sentences = !sentences->empty();
+    const std::string model = text(table, "model", "generic");
+    for (const LidarCircuit& circuit : circuits().lidars)
+        if (circuit.model == model) lidar.circuit = &circuit;
+    if (lidar.circuit == nullptr)
+        lidar.problem = fmt::format(
+            "no circuit of model '{}' is known: see the manual of what is connected, and "
+            "'versavis wiring livox' (3.3 V) or 'versavis wiring velodyne' (5 V) for how the "
+            "board drives it",
+            model);
+    else
+        lidar.serial_inverted = table["serial_inverted"].value_or(rests_low(*lidar.circuit));
+    return lidar;
+}
+
+/// The board has one serial line: outputs without sentences may have those of the one that sends.
+void share_sentences(std::vector<WiredLidar>& lidars) {
+    const auto sender = std::find_if(lidars.begin(), lidars.end(),
+                                     [](const WiredLidar& lidar) { return lidar.sentences; });
+    if (sender == lidars.end()) return;
+    for (WiredLidar& lidar : lidars) {
+        if (lidar.sentences) continue;
+        lidar.sentences = true;
+        lidar.sentences_of = sender->name;
+        lidar.serial_inverted = sender->serial_inverted;
+    }
+}
+
 template <class Use>
 void each_table(const toml::table& file, const char* key, Use use) {
     if (const auto* tables = file[key].as_array())
@@ -109,6 +144,19 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 }  // namespace
 
+bool rests_low(const LidarCircuit& circuit) { return circuit.serial.circuit.rest == "low"; }
+
+std::string shared_line_warning(const WiredLidar& lidar) {
+    if (lidar.sentences_of.empty()) return "";
+    std::string text = fmt::format("The sentences are those of {}.", lidar.sentences_of);
+    if (lidar.circuit != nullptr && rests_low(*lidar.circuit) != lidar.serial_inverted)
+        text += fmt::format(
+            " Its line rests {}, and this LiDAR wants the other polarity: put an inverter in "
+            "between, such as a 74LVC1G04.",
+            lidar.serial_inverted ? "low" : "high");
+    return text;
+}
+
 Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& preset_of) {
     const auto file = parse_service_file(path);
     if (!file) return Unexpected<>(file.error().front());
@@ -119,6 +167,17 @@ Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& 
     });
     each_table(*file, "imu",
                [&](const toml::table& table) { parts.imus.push_back(configured_imu(table)); });
+    each_table(*file, "time_output",
+               [&](const toml::table& table) { parts.lidars.push_back(configured_lidar(table)); });
+    share_sentences(parts.lidars);
+    std::vector<std::string> outputs;
+    for (const WiredCamera& camera : parts.cameras)
+        outputs.push_back(fmt::format("trigger{}", camera.output));
+    for (const WiredLidar& lidar : parts.lidars) outputs.push_back(lidar.output);
+    for (const std::string& output : outputs)
+        if (circuits().board.signals.count(output) == 0)
+            return failure(path, fmt::format("names {}, which the board has not", output),
+                           "see 'versavisd --check-config'");
     return parts;
 }
 
@@ -127,6 +186,7 @@ Expected<WiredParts> named_wiring(const std::vector<std::string>& names) {
     for (const std::string& name : names) {
         const CameraCircuit* camera = circuits().camera(name);
         const ImuCircuit* imu = circuits().imu(name);
+        const LidarCircuit* lidar = circuits().lidar(name);
         if (camera != nullptr) {
             WiredCamera wired;
             wired.circuit = camera;
@@ -135,6 +195,11 @@ Expected<WiredParts> named_wiring(const std::vector<std::string>& names) {
             WiredImu wired;
             wired.circuit = imu;
             parts.imus.push_back(std::move(wired));
+        } else if (lidar != nullptr) {
+            WiredLidar wired;
+            wired.circuit = lidar;
+            wired.serial_inverted = rests_low(*lidar);
+            parts.lidars.push_back(std::move(wired));
         } else {
             return failure(name, "there is no such circuit", "see 'versavis wiring --list'");
         }
@@ -145,6 +210,7 @@ Expected<WiredParts> named_wiring(const std::vector<std::string>& names) {
 Expected<WiredParts> only(WiredParts parts, const std::vector<std::string>& names) {
     std::vector<std::string> known = names_of(parts.cameras);
     for (std::string& imu : names_of(parts.imus)) known.push_back(std::move(imu));
+    for (std::string& lidar : names_of(parts.lidars)) known.push_back(std::move(lidar));
     for (const std::string& name : names)
         if (!contains(known, name))
             return failure(name, "is neither a circuit nor a part that the board serves",
@@ -156,6 +222,7 @@ Expected<WiredParts> only(WiredParts parts, const std::vector<std::string>& name
     };
     std::erase_if(parts.cameras, unwanted);
     std::erase_if(parts.imus, unwanted);
+    std::erase_if(parts.lidars, unwanted);
     return parts;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The cameras and IMUs of a configuration, each with its circuit.
+// The cameras, IMUs and LiDARs of a configuration, each with its circuit.
 #pragma once
 
 #include <functional>
@@ -28,9 +28,29 @@ struct WiredImu {
     std::string problem;
 };
 
+struct WiredLidar {
+    std::string name;
+    std::string output = "sync_output";  ///< of the board, where the pulses leave
+    bool pulse_inverted = false;         ///< they rest high
+    bool serial_inverted = false;        ///< the serial line rests low
+    bool sentences = true;               ///< there is a serial line
+    std::string sentences_of{};          ///< the other output that sends them; empty: its own
+    const LidarCircuit* circuit = nullptr;
+    std::string problem;
+};
+
+/// Whether its line of sentences does, as its maker wants it.
+bool rests_low(const LidarCircuit& circuit);
+
+/// What is to be said where another output's sentences serve it; empty: nothing.
+std::string shared_line_warning(const WiredLidar& lidar);
+
 struct WiredParts {
     std::vector<WiredCamera> cameras;
     std::vector<WiredImu> imus;
+    std::vector<WiredLidar> lidars;
+
+    bool empty() const { return cameras.empty() && imus.empty() && lidars.empty(); }
 };
 
 /// The preset of a camera for which the configuration names none; empty: not known.

@@ -106,8 +106,8 @@ void Sheet::to_level(int x, int y, int ohm, const std::string& level, bool up) {
 }
 
 /// A buffer; its input is at one side, its output at the other.
-void Sheet::gate(int x, int y, const std::string& name, const std::string& rail, bool enable,
-                 bool to_right) {
+void Sheet::gate(int x, int y, const std::string& name, const std::string& rail,
+                 const std::string& ties, bool to_right) {
     const int tip = to_right ? x + 20 : x - 20;
     const int back = to_right ? x - 20 : x + 20;
     add(fmt::format(R"(<polygon points="{},{} {},{} {},{}" fill="#fff8e0" stroke="#333" )"
@@ -115,7 +115,7 @@ void Sheet::gate(int x, int y, const std::string& name, const std::string& rail,
                     back, y - 20, back, y + 20, tip, y));
     add(text(x, y - 26, name, "#000", "middle"));
     add(text(x, y + 34, named_level(rail), "#777", "middle"));
-    if (enable) add(text(x, y + 48, "/OE to ground", "#777", "middle"));
+    if (!ties.empty()) add(text(x, y + 48, ties, "#777", "middle"));
 }
 
 void Sheet::board_pin(int y, const std::string& signal) {
@@ -157,7 +157,7 @@ void Sheet::trigger(int y, const std::string& signal, const TriggerCircuit& circ
     gate(330, y,
          circuit.gates == 1 ? driver.name
                             : fmt::format("{} gates of {}", circuit.gates, driver.name),
-         driver.rail, driver.enable, true);
+         driver.rail, driver.ties, true);
     resistor(440, y, circuit.series_ohm, false);
 }
 
@@ -168,7 +168,7 @@ void Sheet::exposure(int y, const std::string& signal, const ExposureCircuit& ci
         resistor(440, y, circuit.divider_ohm[0], false);
         to_level(330, y, circuit.divider_ohm[1], "ground", false);
     }
-    if (!circuit.buffer.empty()) gate(330, y, circuit.buffer, "3.3 V", false, false);
+    if (!circuit.buffer.empty()) gate(330, y, circuit.buffer, "3.3 V", "", false);
     if (circuit.pull_up_ohm != 0) to_level(440, y, circuit.pull_up_ohm, "3.3 V", true);
 }
 
@@ -258,6 +258,32 @@ Sheet drawing(const WiredImu& imu) {
     return sheet;
 }
 
+Sheet drawing(const WiredLidar& lidar) {
+    constexpr int pulse_y = 130;
+    constexpr int serial_y = 270;
+    constexpr int ground_y = 350;
+    const LidarCircuit& circuit = *lidar.circuit;
+    Sheet sheet(with_name(lidar.name, circuit.title),
+                fmt::format("Model \"{}\". {}.", circuit.model, circuit.connector), "LiDAR");
+    const auto add = [&](int y, const std::string& signal, const TriggerWiring& wiring, bool high) {
+        TriggerCircuit resting = wiring.circuit;
+        resting.rest = high ? "high" : "low";
+        sheet.trigger(y, signal, resting);
+        sheet.device_pin(y, wiring.pin, wiring.line, figures(wiring.input), "output");
+    };
+    add(pulse_y, lidar.output, circuit.pulse, lidar.pulse_inverted);
+    if (lidar.sentences) add(serial_y, "uart_transmit", circuit.serial, !lidar.serial_inverted);
+    sheet.ground(ground_y);
+    sheet.device_pin(ground_y, 0, circuit.ground, "", "supply");
+    sheet.end_at(ground_y + 24);
+    if (!circuit.unknown.empty())
+        sheet.note(fmt::format("See the LiDAR's manual for {}.", circuit.unknown));
+    if (std::string shared = shared_line_warning(lidar); !shared.empty())
+        sheet.note(std::move(shared));
+    for (const std::string& note : circuit.notes) sheet.note(note);
+    return sheet;
+}
+
 Sheet driven_outputs_drawing() {
     Sheet sheet("Outputs that drive high by themselves", "One or the other.",
                 "camera, GNSS receiver, PLC");
@@ -294,6 +320,8 @@ std::vector<Sheet> drawings(const WiredParts& parts) {
         if (camera.circuit != nullptr) sheets.push_back(drawing(camera));
     for (const WiredImu& imu : parts.imus)
         if (imu.circuit != nullptr) sheets.push_back(drawing(imu));
+    for (const WiredLidar& lidar : parts.lidars)
+        if (lidar.circuit != nullptr) sheets.push_back(drawing(lidar));
     return sheets;
 }
 

@@ -38,8 +38,8 @@ class Sheet {
     void wire(int x, int y, int to_x, int to_y);
     void resistor(int x, int y, int ohm, bool upright);
     void to_level(int x, int y, int ohm, const std::string& level, bool up);
-    void gate(int x, int y, const std::string& name, const std::string& rail, bool enable,
-              bool to_right);
+    void gate(int x, int y, const std::string& name, const std::string& rail,
+              const std::string& ties, bool to_right);
 
     std::string title_;
     std::string subtitle_;
@@ -51,6 +51,7 @@ class Sheet {
 
 Sheet drawing(const WiredCamera& camera);
 Sheet drawing(const WiredImu& imu);
+Sheet drawing(const WiredLidar& lidar);
 
 /// Of outputs that drive their high level by themselves.
 Sheet driven_outputs_drawing();

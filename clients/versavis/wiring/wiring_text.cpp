@@ -15,7 +15,7 @@ using nlohmann::json;
 constexpr auto rules =
     "A pin of the board takes 0 to 3.3 V, and more destroys it. Each buffer needs 100 nF at its\n"
     "supply. Tie the inputs of unused gates to ground. Never plug or unplug with the power on.\n"
-    "When all is wired: versavis camera check\n";
+    "When all is wired: versavis camera check, and versavis lidar check\n";
 
 std::string row(const char* title, const std::string& text) {
     constexpr std::size_t text_column = 12;
@@ -36,24 +36,30 @@ std::string camera_pin(int pin, const std::string& line) {
                     : fmt::format("camera pin {} ({})", pin, line);
 }
 
-std::string trigger_rows(const WiredCamera& camera) {
-    const TriggerWiring& trigger = camera.circuit->trigger;
-    const TriggerCircuit& circuit = trigger.circuit;
+/// From an output of the board to an input at `pin` of a `device`; `high`: it rests there.
+std::string output_rows(const char* title, const std::string& signal, const TriggerWiring& wiring,
+                        bool high, const char* device, const std::string& pin) {
+    const TriggerCircuit& circuit = wiring.circuit;
     const Driver& driver = *circuits().driver(circuit.driver);
-    const std::string signal = fmt::format("trigger{}", camera.output);
     const std::string gates = circuit.gates == 1
                                   ? driver.name
                                   : fmt::format("{} gates of {}", circuit.gates, driver.name);
-    const bool high = camera.inverted || circuit.rest == "high";
     std::string rows =
-        row("trigger",
+        row(title,
             fmt::format("{} -> {} -> {}", board_pin(signal), gates, ohms(circuit.series_ohm))) +
-        row("", "-> " + camera_pin(trigger.pin, trigger.line)) +
+        row("", "-> " + pin) +
         row("", fmt::format("{} from {} to {}", ohms(circuit.rest_ohm), board_pin(signal),
                             board_pin(high ? "3.3 V" : "ground"))) +
-        row("", fmt::format("supply of {}: {}{}", driver.name, board_pin(driver.rail),
-                            driver.enable ? ", its /OE to ground" : ""));
-    return rows + row("", "camera: " + figures(trigger.input));
+        row("", fmt::format("supply of {}: {}{}{}", driver.name, board_pin(driver.rail),
+                            driver.ties.empty() ? "" : "; ", driver.ties));
+    return rows + row("", fmt::format("{}: {}", device, figures(wiring.input)));
+}
+
+std::string trigger_rows(const WiredCamera& camera) {
+    const TriggerWiring& trigger = camera.circuit->trigger;
+    return output_rows("trigger", fmt::format("trigger{}", camera.output), trigger,
+                       camera.inverted || trigger.circuit.rest == "high", "camera",
+                       camera_pin(trigger.pin, trigger.line));
 }
 
 std::string exposure_rows(const WiredCamera& camera) {
@@ -108,6 +114,32 @@ std::string imu_text(const WiredImu& imu) {
     return text + row("!", "Wires shorter than 20 cm.") + row("source", imu.circuit->source);
 }
 
+std::string lidar_pin(const TriggerWiring& wiring) {
+    return wiring.pin == 0 ? "LiDAR " + wiring.line
+                           : fmt::format("LiDAR pin {} ({})", wiring.pin, wiring.line);
+}
+
+std::string lidar_text(const WiredLidar& lidar) {
+    const std::string name = lidar.name.empty() ? "" : lidar.name + ": ";
+    if (lidar.circuit == nullptr) return client::wrapped(name + lidar.problem, 2);
+    const LidarCircuit& circuit = *lidar.circuit;
+    std::string text = fmt::format("{}{}\n", name, circuit.title) +
+                       row("connector", circuit.connector) +
+                       output_rows("pulse", lidar.output, circuit.pulse, lidar.pulse_inverted,
+                                   "LiDAR", lidar_pin(circuit.pulse));
+    text += lidar.sentences
+                ? output_rows("serial", "uart_transmit", circuit.serial, !lidar.serial_inverted,
+                              "LiDAR", lidar_pin(circuit.serial))
+                : row("serial", "not wired: sentences = []");
+    text += row("ground", fmt::format("{} - LiDAR {}", board_pin("ground"), circuit.ground));
+    if (!circuit.unknown.empty())
+        text += row("!", fmt::format("See the LiDAR's manual for {}.", circuit.unknown));
+    if (const std::string shared = shared_line_warning(lidar); !shared.empty())
+        text += row("!", shared);
+    for (const std::string& note : circuit.notes) text += row("!", note);
+    return text + row("source", circuit.source);
+}
+
 /// A row of the table by its name.
 json table_row(const char* group, const std::string& name) {
     for (const json& each : circuits_json().at(group))
@@ -128,6 +160,7 @@ std::string wiring_text(const WiredParts& parts) {
     std::string text;
     for (const WiredCamera& camera : parts.cameras) text += camera_text(camera) + "\n";
     for (const WiredImu& imu : parts.imus) text += imu_text(imu) + "\n";
+    for (const WiredLidar& lidar : parts.lidars) text += lidar_text(lidar) + "\n";
     return text + fmt::format("The board is a {}.\n", circuits().board.name) + rules;
 }
 
@@ -135,7 +168,8 @@ json wiring_json(const WiredParts& parts) {
     json all{{"board", circuits_json().at("board")},
              {"drivers", circuits_json().at("drivers")},
              {"cameras", json::array()},
-             {"imus", json::array()}};
+             {"imus", json::array()},
+             {"lidars", json::array()}};
     for (const WiredCamera& camera : parts.cameras) {
         json one = part_json("cameras", camera);
         one["output"] = camera.output;
@@ -144,6 +178,15 @@ json wiring_json(const WiredParts& parts) {
         all["cameras"].push_back(one);
     }
     for (const WiredImu& imu : parts.imus) all["imus"].push_back(part_json("imus", imu));
+    for (const WiredLidar& lidar : parts.lidars) {
+        json one = part_json("lidars", lidar);
+        one["output"] = lidar.output;
+        one["pulse_inverted"] = lidar.pulse_inverted;
+        one["serial_inverted"] = lidar.serial_inverted;
+        one["sentences"] = lidar.sentences;
+        one["sentences_of"] = lidar.sentences_of.empty() ? lidar.name : lidar.sentences_of;
+        all["lidars"].push_back(one);
+    }
     return all;
 }
 
@@ -152,6 +195,8 @@ std::string circuits_text() {
     for (const CameraCircuit& circuit : circuits().cameras)
         text += fmt::format("{:<14} {}\n", circuit.name, circuit.title);
     for (const ImuCircuit& circuit : circuits().imus)
+        text += fmt::format("{:<14} {}\n", circuit.name, circuit.title);
+    for (const LidarCircuit& circuit : circuits().lidars)
         text += fmt::format("{:<14} {}\n", circuit.name, circuit.title);
     return text;
 }

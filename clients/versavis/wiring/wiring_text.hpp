@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The wiring of cameras and IMUs pin by pin, for a terminal and as JSON.
+// The wiring of cameras, IMUs and LiDARs pin by pin, for a terminal and as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,7 +11,7 @@ namespace versavis::client {
 
 std::string wiring_text(const WiredParts& parts);
 
-/// {"board", "cameras", "imus"}; docs/user/wiring.md has the members.
+/// {"board", "drivers", "cameras", "imus", "lidars"}; docs/user/wiring.md has the members.
 nlohmann::json wiring_json(const WiredParts& parts);
 
 /// The circuits that are known, by name.

@@ -291,10 +291,12 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     }
     if (old) wake_readers(old->header());
     return Writer(
-        std::make_unique<Segment>(path, std::move(*mapping), std::move(server), shape.first_item));
+        std::make_unique<Segment>(path, std::move(*mapping), std::move(server), shape.first_item),
+        shape.kept);
 }
 
-Writer::Writer(std::unique_ptr<Segment> segment) : segment_(std::move(segment)) {
+Writer::Writer(std::unique_ptr<Segment> segment, std::uint32_t kept)
+    : segment_(std::move(segment)), kept_(kept) {
     for (std::uint32_t slot = 0; slot < slot_count(); ++slot) free_.push_back(slot);
 }
 Writer::Writer(Writer&&) noexcept = default;
@@ -312,8 +314,9 @@ void Writer::heartbeat(HostTime now) {
 
 std::optional<std::uint32_t> Writer::acquire() {
     if (free_.empty()) return std::nullopt;
-    const std::uint32_t slot = free_.front();
-    free_.pop_front();
+    const auto found = kept_ != 0 && free_.size() > kept_ ? free_.end() - kept_ - 1 : free_.begin();
+    const std::uint32_t slot = *found;
+    free_.erase(found);
     // SYNC 4: release fence here, acquire fence in Payload::valid(): the generation is odd before
     // the first byte of the new payload is stored.
     segment_->mapping.generation(slot).fetch_add(1, std::memory_order_relaxed);
@@ -324,7 +327,8 @@ std::optional<std::uint32_t> Writer::acquire() {
 void Writer::abandon(std::uint32_t slot) {
     // Belongs to no pair: no descriptor names this generation, so every reader refuses the slot.
     segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release);
-    free_.push_front(slot);  // it holds nothing that a reader could want
+    // It holds nothing that a reader could want.
+    free_.insert(kept_ != 0 && free_.size() > kept_ ? free_.end() - kept_ : free_.begin(), slot);
 }
 
 void Writer::publish(std::uint32_t slot, std::uint32_t length, OutputTime time,

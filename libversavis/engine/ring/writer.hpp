@@ -24,7 +24,20 @@ struct Shape {
     std::uint64_t slot_size = 0;   ///< bytes of payload that one slot holds; rounded up to pages
     std::uint64_t first_item = 0;  ///< number of the first item; tests start it near a wrap
     std::uint64_t life = 0;        ///< 0: that of this process
+    /// Items whose slots stay as they are; the slot that became free last of the others is the next
+    /// to be written, while it is in the processor's caches. 0: the oldest item's is, so that as
+    /// many items as possible stay readable.
+    std::uint32_t kept = 0;
 };
+
+/// A ring without history keeps these: a reader has two periods for a frame, and the frames of a
+/// set may be one period apart. Half: a reader that takes longer than a period loses frames. Twice:
+/// two frames more in the caches.
+constexpr std::uint32_t newest_kept = 2;
+
+/// What `kept` items need: readers go on at half as many items before the newest as there are
+/// descriptors.
+constexpr std::uint32_t descriptors_of_kept(std::uint32_t kept) { return 2 * kept; }
 
 /// Where rings are made, and how.
 struct Place {
@@ -49,8 +62,8 @@ class Writer {
     Writer& operator=(Writer&&) noexcept;
     ~Writer();  ///< closes the stream, wakes its readers and removes the segment's name
 
-    /// Takes the slot with the oldest item, which readers lose from here on; none when all are
-    /// taken.
+    /// Takes a free slot, by `Shape::kept`; readers lose the item in it from here on. None when all
+    /// are taken.
     std::optional<std::uint32_t> acquire();
     std::byte* slot_data(std::uint32_t slot) const;
     std::uint64_t slot_size() const;
@@ -75,11 +88,12 @@ class Writer {
 
  private:
     struct Segment;
-    explicit Writer(std::unique_ptr<Segment> segment);
+    Writer(std::unique_ptr<Segment> segment, std::uint32_t kept);
     void write_descriptor(std::uint64_t slot_generation, std::uint64_t length_and_slot,
                           OutputTime time, const Metadata& metadata);
 
     std::unique_ptr<Segment> segment_;
+    std::uint32_t kept_;
     std::deque<std::uint32_t> free_;  ///< slots to hand out, the one longest untouched first
 };
 

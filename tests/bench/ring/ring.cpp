@@ -45,14 +45,14 @@ void report(Metrics& metrics, const std::string& load, const Outcomes& outcomes)
     }
 }
 
-/// `value` of the ring's outcome against the same of another transport, if that took part.
+/// `value` of a ring's outcome against the same of another transport, if that took part.
 void compare(Metrics& metrics, const std::string& load, const Outcomes& outcomes,
-             const std::string& other, double (*value)(const Outcome&),
-             std::optional<double> goal) {
+             const std::string& other, double (*value)(const Outcome&), std::optional<double> goal,
+             const std::string& ring = "ring") {
     const auto found = outcomes.find(other);
     if (found == outcomes.end()) return;
-    const double ratio = value(outcomes.at("ring")) / value(found->second);
-    metrics.push_back({fmt::format("{}, to {}", load, other), ratio, "ratio", goal});
+    const double ratio = value(outcomes.at(ring)) / value(found->second);
+    metrics.push_back({fmt::format("{}, {} to {}", load, ring, other), ratio, "ratio", goal});
 }
 
 std::vector<Transport> with(std::vector<Transport> transports,
@@ -112,29 +112,35 @@ void measure_frames(Metrics& metrics, const std::optional<Transport>& peer) {
         load.readers = readers;
         load.items = 60;
         load.interval = milliseconds(10);
-        auto transports = with({versavis_ring()}, peer);
+        auto transports = with({versavis_ring(), ring_without_history()}, peer);
         if (readers == 1) transports = with(with(transports, boost_queue()), zeromq());
         const Outcomes outcomes = race_all(transports, load);
         const auto name = fmt::format("frame, {} waiting", readers);
         report(metrics, name, outcomes);
-        compare(metrics, name, outcomes, "iceoryx", p50, 0.7);
+        compare(metrics, name, outcomes, "iceoryx", p50, {});
+        compare(metrics, name, outcomes, "iceoryx", p50, 0.7, without_history);
     }
 }
 
-void measure_cost(Metrics& metrics, const std::optional<Transport>& peer) {
+void measure_cost(Metrics& metrics, const std::optional<Transport>& peer, unsigned readers,
+                  double goal) {
     Load load;
     load.size = frame_size;
+    load.readers = readers;
     load.items = 1000;
     load.interval = milliseconds(2);
-    const Outcomes outcomes = race_all(with({versavis_ring(), bare_futex()}, peer), load);
+    const Outcomes outcomes =
+        race_all(with({versavis_ring(), ring_without_history(), bare_futex()}, peer), load);
     const auto cpu = [](const Outcome& outcome) { return outcome.cpu_ns_per_item(); };
+    const auto name = fmt::format("frame, CPU, {} waiting", readers);
     for (const auto& [transport, outcome] : outcomes)
+        metrics.push_back({fmt::format("{}, {}", name, transport), cpu(outcome) / 1000, "us", {}});
+    compare(metrics, name, outcomes, "bare futex", cpu, 1.1);
+    compare(metrics, name, outcomes, "iceoryx", cpu, {});
+    compare(metrics, name, outcomes, "iceoryx", cpu, goal, without_history);
+    if (readers == 1)
         metrics.push_back(
-            {fmt::format("frame, CPU, {}", transport), cpu(outcome) / 1000, "us", {}});
-    compare(metrics, "frame, CPU", outcomes, "bare futex", cpu, 1.1);
-    compare(metrics, "frame, CPU", outcomes, "iceoryx", cpu, 0.6);
-    metrics.push_back(
-        {"page_faults_in_1000_frames", outcomes.at("ring").page_faults / rounds, "faults", 0});
+            {"page_faults_in_1000_frames", outcomes.at("ring").page_faults / rounds, "faults", 0});
 }
 
 /// Every byte written and read.
@@ -144,7 +150,7 @@ void measure_throughput(Metrics& metrics, const std::optional<Transport>& peer) 
     load.items = 4000;
     load.interval = {};
     load.reading = Reading::all_bytes;
-    const Outcomes outcomes = race_all(with({versavis_ring()}, peer), load);
+    const Outcomes outcomes = race_all(with({versavis_ring(), ring_without_history()}, peer), load);
     for (const auto& [transport, outcome] : outcomes)
         metrics.push_back({fmt::format("frames unthrottled, {}", transport),
                            outcome.bytes_per_second() * 1e-9,
@@ -248,7 +254,8 @@ std::vector<Metric> bench_ring() {
     measure_blocking(metrics, peer);
     measure_crowd(metrics);
     measure_frames(metrics, peer);
-    measure_cost(metrics, peer);
+    measure_cost(metrics, peer, 1, 0.6);
+    measure_cost(metrics, peer, 4, 0.4);
     measure_throughput(metrics, peer);
     measure_sets(metrics);
     return metrics;

@@ -55,6 +55,10 @@ struct Transport {
 
 Transport versavis_ring();
 
+/// Of frames, as with `history = "none"`.
+inline constexpr auto without_history = "ring without history";
+Transport ring_without_history();
+
 /// The same, but readers from number 1 on are a thousand threads that wait in a loop.
 Transport crowded_ring();
 

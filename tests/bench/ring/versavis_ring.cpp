@@ -30,11 +30,18 @@ ring::Shape shape_of(const Channel& channel) {
     return {ring_name, ring::StreamKind::frames, 64, frame_slots, channel.size};
 }
 
+ring::Shape shape_without_history(const Channel& channel) {
+    ring::Shape shape = shape_of(channel);
+    shape.kept = ring::newest_kept;
+    shape.descriptor_count = ring::descriptors_of_kept(shape.kept);
+    return shape;
+}
+
 class RingSender : public Sender {
  public:
-    explicit RingSender(const Channel& channel)
+    RingSender(const Channel& channel, const ring::Shape& shape)
         : size_(static_cast<std::uint32_t>(channel.size)),
-          writer_(checked(ring::Writer::create(channel.directory, shape_of(channel)))) {}
+          writer_(checked(ring::Writer::create(channel.directory, shape))) {}
 
     std::byte* loan() override {
         // As often as the service does, and like there not within the publication.
@@ -114,7 +121,11 @@ class Crowd : public Receiver {
 };
 
 std::unique_ptr<Sender> sender(const Channel& channel) {
-    return std::make_unique<RingSender>(channel);
+    return std::make_unique<RingSender>(channel, shape_of(channel));
+}
+
+std::unique_ptr<Sender> sender_without_history(const Channel& channel) {
+    return std::make_unique<RingSender>(channel, shape_without_history(channel));
 }
 
 std::unique_ptr<Receiver> receiver(const Channel& channel, unsigned) {
@@ -129,6 +140,7 @@ std::unique_ptr<Receiver> receiver_or_crowd(const Channel& channel, unsigned rea
 }  // namespace
 
 Transport versavis_ring() { return {"ring", sender, receiver}; }
+Transport ring_without_history() { return {without_history, sender_without_history, receiver}; }
 Transport crowded_ring() { return {"ring among a crowd", sender, receiver_or_crowd}; }
 
 }  // namespace versavis::bench

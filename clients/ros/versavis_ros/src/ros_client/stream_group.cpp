@@ -13,10 +13,15 @@ namespace {
 
 constexpr Duration search_period = seconds(1);
 
+/// Items of one stream in a row, while others wait: a sink that is slow must not be kept by one.
+constexpr int in_a_row = 16;
+
 }  // namespace
 
 struct StreamGroup::Source {
-    Source(std::string stream_name, std::variant<FrameStream, ImuStream, EventStream> opened)
+    using Stream = std::variant<FrameStream, ImuStream, EventStream, NmeaStream>;
+
+    Source(std::string stream_name, Stream opened)
         : name(std::move(stream_name)), stream(std::move(opened)) {}
 
     ring::Reader& reader() {
@@ -24,7 +29,7 @@ struct StreamGroup::Source {
     }
 
     std::string name;
-    std::variant<FrameStream, ImuStream, EventStream> stream;
+    Stream stream;
 };
 
 StreamGroup::StreamGroup(std::string instance, std::vector<std::string> wanted, Sink& sink)
@@ -62,6 +67,8 @@ Expected<> StreamGroup::look_for_streams() {
         if (info.kind == ring::StreamKind::frames) take(FrameStream::open(info.name, options_));
         if (info.kind == ring::StreamKind::imu) take(ImuStream::open(info.name, options_));
         if (info.kind == ring::StreamKind::events) take(EventStream::open(info.name, options_));
+        if (info.kind == ring::StreamKind::nmea && sink_.takes_sentences())
+            take(NmeaStream::open(info.name, options_));
     }
     if (found.empty()) return {};
     wait_set_.emplace();
@@ -77,7 +84,7 @@ Expected<> StreamGroup::look_for_streams() {
 
 Expected<> StreamGroup::hand_out(Source& source) {
     const auto all = [&](auto& stream, auto take) -> Expected<> {
-        for (;;) {
+        for (int i = 0; i < in_a_row; ++i) {
             const auto item = stream.next();
             if (!item) {
                 lost_ += item.error().lost;
@@ -87,11 +94,14 @@ Expected<> StreamGroup::hand_out(Source& source) {
             }
             if (auto done = (sink_.*take)(source.name, *item); !done) return done;
         }
+        return {};
     };
     if (auto* frames = std::get_if<FrameStream>(&source.stream))
         return all(*frames, &Sink::on_frame);
     if (auto* samples = std::get_if<ImuStream>(&source.stream))
         return all(*samples, &Sink::on_sample);
+    if (auto* sentences = std::get_if<NmeaStream>(&source.stream))
+        return all(*sentences, &Sink::on_sentence);
     return all(std::get<EventStream>(source.stream), &Sink::on_event);
 }
 

@@ -24,6 +24,12 @@ class Sink {
     virtual Expected<> on_frame(const std::string& name, const Frame& frame) = 0;
     virtual Expected<> on_sample(const std::string& name, const ImuSample& sample) = 0;
     virtual Expected<> on_event(const std::string& name, const Event& event) = 0;
+
+    /// Sentences of a GNSS receiver are read only for those who take them.
+    virtual bool takes_sentences() const { return false; }
+    virtual Expected<> on_sentence(const std::string& /*name*/, const NmeaSentence& /*sentence*/) {
+        return {};
+    }
 };
 
 /// Used by one thread.

@@ -7,8 +7,9 @@
 #include <memory>
 
 #include "export/export_image.hpp"
+#include "versavis/pixel_format.hpp"
 
-namespace versavis::web {
+namespace versavis::client {
 
 namespace {
 
@@ -16,7 +17,7 @@ namespace {
 constexpr int jpeg_quality = 85;
 
 /// As `pixels` of full scale, cut to 8 bits.
-Pixels to_8_bit(const client::ExportFormat& format, const FrameMetadata& frame,
+Pixels to_8_bit(const ExportFormat& format, const FrameMetadata& frame,
                 std::vector<std::byte> pixels) {
     Pixels made{frame.width, frame.height, format.channels, {}};
     made.values.resize(pixels.size() / format.bytes);
@@ -29,7 +30,7 @@ Pixels to_8_bit(const client::ExportFormat& format, const FrameMetadata& frame,
 }
 
 /// Of words, all bits count: the largest value of 12 bits is 0xfff0 at full scale.
-double saturated_part(const client::ExportFormat& format, const std::vector<std::byte>& pixels) {
+double saturated_part(const ExportFormat& format, const std::vector<std::byte>& pixels) {
     const std::size_t values = pixels.size() / format.bytes;
     const auto most = static_cast<std::uint16_t>(0xffffU << format.shift);
     std::size_t saturated = 0;
@@ -158,13 +159,13 @@ Pixels reduced(const Pixels& pixels, std::uint32_t factor) {
 
 Expected<Picture> make_picture(const std::string& stream, const FrameMetadata& frame,
                                std::span<const std::byte> payload, std::uint32_t widest) {
-    const auto format = client::export_format(stream, frame.pixel_format);
+    const auto format = export_format(stream, frame.pixel_format);
     if (!format)
         return failure(stream,
                        std::string("pixels of format ") + pixel_format_name(frame.pixel_format) +
                            " cannot be shown",
                        "choose an unpacked one as the camera's PixelFormat");
-    auto pixels = client::export_pixels(*format, frame, payload);
+    auto pixels = export_pixels(*format, frame, payload);
     if (pixels.empty())
         return failure(stream, "the frame holds fewer bytes than its width and height require");
     Picture picture;
@@ -186,4 +187,4 @@ Expected<Picture> make_picture(const std::string& stream, const FrameMetadata& f
     return picture;
 }
 
-}  // namespace versavis::web
+}  // namespace versavis::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A frame as a browser shows it: colours by its Bayer pattern, JPEG, and how its values are spread.
+// A frame as people look at it: colours by its Bayer pattern, JPEG, and how its values are spread.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
 
-namespace versavis::web {
+namespace versavis::client {
 
 inline constexpr std::size_t histogram_bins = 64;
 
@@ -48,4 +48,4 @@ Pixels reduced(const Pixels& pixels, std::uint32_t factor);
 Expected<Picture> make_picture(const std::string& stream, const FrameMetadata& frame,
                                std::span<const std::byte> payload, std::uint32_t widest);
 
-}  // namespace versavis::web
+}  // namespace versavis::client

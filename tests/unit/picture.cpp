@@ -6,7 +6,7 @@
 #include <vector>
 
 using namespace versavis;
-using namespace versavis::web;
+using namespace versavis::client;
 
 namespace {
 
@@ -44,7 +44,7 @@ std::uint32_t total(const Picture& picture) {
 
 }  // namespace
 
-TEST_CASE("web_picture: an area of one colour is that, whatever the pattern and size") {
+TEST_CASE("picture: an area of one colour is that, whatever the pattern and size") {
     const std::array<std::uint8_t, 3> colour{200, 90, 10};
     const std::string pattern = GENERATE("rggb", "grbg", "gbrg", "bggr");
     const auto [width, height] = GENERATE(std::pair(2U, 2U), std::pair(3U, 5U), std::pair(8U, 2U));
@@ -58,7 +58,7 @@ TEST_CASE("web_picture: an area of one colour is that, whatever the pattern and 
     CHECK(demosaic_by_cells(raw, pattern).height == height / 2);
 }
 
-TEST_CASE("web_picture: a reduced picture has the means of its squares") {
+TEST_CASE("picture: a reduced picture has the means of its squares") {
     const Pixels pixels{
         5, 4, 1, {0, 10, 20, 30, 99, 10, 20, 40, 50, 99, 1, 1, 5, 5, 99, 1, 1, 5, 5, 99}};
     const Pixels made = reduced(pixels, 2);
@@ -68,7 +68,7 @@ TEST_CASE("web_picture: a reduced picture has the means of its squares") {
     CHECK(reduced(pixels, 1).values == pixels.values);
 }
 
-TEST_CASE("web_picture: histogram and saturation are of all bits") {
+TEST_CASE("picture: histogram and saturation are of all bits") {
     std::vector<std::byte> payload(8, std::byte{0});
     payload[1] = std::byte{0x0f};  // 0x0f00
     payload[2] = std::byte{0xff};
@@ -84,7 +84,7 @@ TEST_CASE("web_picture: histogram and saturation are of all bits") {
     CHECK(picture->width == 4);
 }
 
-TEST_CASE("web_picture: wide frames are reduced, and small ones are shown as they are") {
+TEST_CASE("picture: wide frames are reduced, and small ones are shown as they are") {
     const auto [format, width, height, shown_width, shown_height] = GENERATE(
         std::tuple(mono8, 1920U, 1200U, 640U, 400U),
         std::tuple(bayer_rg8, 1920U, 1200U, 480U, 300U), std::tuple(bayer_rg8, 1600U, 6U, 800U, 3U),
@@ -101,7 +101,7 @@ TEST_CASE("web_picture: wide frames are reduced, and small ones are shown as the
     CHECK(picture->jpeg.substr(0, 2) == "\xff\xd8");
 }
 
-TEST_CASE("web_picture: what cannot be shown says why") {
+TEST_CASE("picture: what cannot be shown says why") {
     const std::vector<std::byte> payload(100);
     const auto packed = make_picture("cam0", frame_of(4, 4, mono12_packed, 2), payload, 800);
     REQUIRE_FALSE(packed);
