@@ -44,8 +44,8 @@ void* aligned_room(std::size_t size) {
         ::mmap(nullptr, room, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (found == MAP_FAILED) return nullptr;
     ::munmap(found, room);
-    const auto address = reinterpret_cast<std::uintptr_t>(found);
-    return reinterpret_cast<void*>((address + huge_page - 1) / huge_page * huge_page);
+    const std::size_t beyond = reinterpret_cast<std::uintptr_t>(found) % huge_page;
+    return static_cast<std::byte*>(found) + (huge_page - beyond) % huge_page;
 }
 
 ipc::mapped_region map(const OpenFile& file, std::size_t size) {

@@ -69,7 +69,8 @@ TEST_CASE("lenses: a lens of another size than the frames is named") {
     const auto lenses = parse_lenses(camera("cam0", "/cam0/image_raw"), "chain.yaml");
     CHECK(lenses->misfit("cam0", 320, 240).empty());
     CHECK(Lenses().misfit("cam1", 640, 480).empty());
-    CHECK_THAT(lenses->misfit("cam1", 640, 480), Contains("cam1: no camera of the calibration"));
+    CHECK_THAT(lenses->misfit("cam1", 640, 480),
+               Contains("cam1: no camera of the calibration has its topic"));
     CHECK(lenses->misfit("cam0", 640, 480) ==
           "cam0: it was calibrated at 320 x 240, and its frames have 640 x 480");
 }

@@ -2,9 +2,13 @@
 #include "foxglove.hpp"
 
 #include <catch2/catch.hpp>
+#include <cstring>
+#include <map>
 
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
+#include "recording/lenses.hpp"
+#include "recording/ros_messages.hpp"
 
 using namespace versavis;
 using namespace versavis::web;
@@ -81,6 +85,53 @@ TEST_CASE("web_foxglove: what was subscribed comes, and what was overwritten is 
     viewed.session.receive(R"({"op":"unsubscribe","subscriptionIds":[7]})");
     viewed.publish(204);
     CHECK(viewed.take().empty());
+}
+
+TEST_CASE("web_foxglove: sentences of a receiver, and the lens of a camera") {
+    constexpr auto camchain =
+        "cam0: {camera_model: pinhole, intrinsics: [300.0, 301.0, 160.0, 120.0], resolution: [320, "
+        "240], distortion_model: radtan, distortion_coeffs: [0.1, 0.2, 0.0, 0.0], rostopic: "
+        "/cam0/image_raw}\n";
+    Viewed viewed;
+    const auto lenses = *client::parse_lenses(camchain, "chain.yaml");
+    viewed.data = LiveData(viewed.instance, lenses);
+    auto nmea = *ring::Writer::create(viewed.directory.path(),
+                                      {"nmea0", ring::StreamKind::nmea, 8, 8, 4096});
+    auto frames = *ring::Writer::create(viewed.directory.path(),
+                                        {"cam0", ring::StreamKind::frames, 8, 8, 4096});
+    std::map<std::string, int> channels;
+    for (auto text = viewed.next_text(); !text.is_null(); text = viewed.next_text())
+        if (text["op"] == "advertise")
+            for (const auto& channel : text["channels"])
+                channels[channel["topic"].get<std::string>()] = channel["id"].get<int>();
+    for (const auto& [id, topic] :
+         {std::pair(1, "/nmea0/nmea_sentence"), std::pair(2, "/cam0/camera_info")})
+        viewed.session.receive(
+            nlohmann::json{{"op", "subscribe"},
+                           {"subscriptions", {{{"id", id}, {"channelId", channels.at(topic)}}}}}
+                .dump());
+    const auto publish = [](ring::Writer& writer, std::int64_t time, const std::string& payload,
+                            const ring::Metadata& metadata) {
+        const auto slot = *writer.acquire();
+        std::memcpy(writer.slot_data(slot), payload.data(), payload.size());
+        writer.publish(slot, static_cast<std::uint32_t>(payload.size()), {time}, metadata);
+        return OutputTime{time};
+    };
+    const auto next = [&] { return viewed.session.next_message(viewed.now).value().substr(13); };
+    const std::string sentence = "$GPZDA,000000.00,01,01,2027,00,00*61";
+    const OutputTime at = publish(nmea, 5, sentence, pack(NmeaMetadata{}));
+    CHECK(next() == client::ros_sentence(at, "nmea0", sentence));
+    FrameMetadata frame{};
+    frame.width = 320;
+    frame.height = 240;
+    OutputTime time = publish(frames, 6, "x", pack(frame));
+    CHECK(next() == client::ros_camera_info(time, "cam0", frame, lenses.find("cam0")));
+    CHECK(viewed.next_text().is_null());
+    frame.width = 640;
+    time = publish(frames, 7, "x", pack(frame));
+    CHECK(next() == client::ros_camera_info(time, "cam0", frame));
+    CHECK(viewed.next_text()["message"] ==
+          "cam0: it was calibrated at 320 x 240, and its frames have 640 x 240");
 }
 
 TEST_CASE("web_foxglove: whatever a viewer sends, the worst is an answer") {

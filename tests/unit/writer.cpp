@@ -92,12 +92,14 @@ std::uint64_t huge_memory(const std::string& name) {
 }
 
 bool kernel_gives_huge_pages() {
-    constexpr std::size_t size = 4 << 20U;
+    constexpr std::size_t page = 2 << 20U;
+    constexpr std::size_t size = 2 * page;
     constexpr int collapse = 25;
     void* memory = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     std::memset(memory, 1, size);
-    const auto at = (reinterpret_cast<std::uintptr_t>(memory) + size / 2 - 1) / (size / 2);
-    const bool given = ::madvise(reinterpret_cast<void*>(at * (size / 2)), size / 2, collapse) == 0;
+    const std::size_t beyond = reinterpret_cast<std::uintptr_t>(memory) % page;
+    std::byte* aligned = static_cast<std::byte*>(memory) + (page - beyond) % page;
+    const bool given = ::madvise(aligned, page, collapse) == 0;
     ::munmap(memory, size);
     return given;
 }

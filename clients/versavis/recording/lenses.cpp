@@ -70,7 +70,7 @@ std::string Lenses::misfit(const std::string& stream, std::uint32_t width,
     if (by_topic.empty()) return "";
     const RosLens* lens = find(stream);
     if (lens == nullptr)
-        return fmt::format("{}: no camera of the calibration, or more than one, has a topic of it",
+        return fmt::format("{}: no camera of the calibration has its topic, or more than one",
                            stream);
     if (lens->width == width && lens->height == height) return "";
     return fmt::format("{}: it was calibrated at {} x {}, and its frames have {} x {}", stream,

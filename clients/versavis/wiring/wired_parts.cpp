@@ -106,8 +106,8 @@ WiredLidar configured_lidar(const toml::table& table) {
             "'versavis wiring livox' (3.3 V) or 'versavis wiring velodyne' (5 V) for how the "
             "board drives it",
             model);
-    else
-        lidar.serial_inverted = table["serial_inverted"].value_or(rests_low(*lidar.circuit));
+    lidar.serial_inverted =
+        table["serial_inverted"].value_or(lidar.circuit != nullptr && rests_low(*lidar.circuit));
     return lidar;
 }
 
@@ -176,7 +176,7 @@ Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& 
     for (const WiredLidar& lidar : parts.lidars) outputs.push_back(lidar.output);
     for (const std::string& output : outputs)
         if (circuits().board.signals.count(output) == 0)
-            return failure(path, fmt::format("names {}, which the board has not", output),
+            return failure(path, fmt::format("names {}, which the board does not have", output),
                            "see 'versavisd --check-config'");
     return parts;
 }
