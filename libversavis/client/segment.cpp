@@ -134,10 +134,10 @@ Expected<Mapping> Mapping::open(const NamedFile& file, const std::filesystem::pa
 }
 
 Expected<> Mapping::populate(const std::filesystem::path& path) const {
-    const bool writes = region_.get_mode() != ipc::read_only;
-    if (::madvise(bytes(), size(), writes ? MADV_POPULATE_WRITE : MADV_POPULATE_READ) == 0) {
+    const int how = region_.get_mode() == ipc::read_only ? MADV_POPULATE_READ : MADV_POPULATE_WRITE;
+    if (::madvise(bytes(), size(), how) == 0) {
         // Fewer misses of the TLB; without them everything works as well.
-        if (writes) ::madvise(bytes(), size(), collapse);
+        if (how == MADV_POPULATE_WRITE) ::madvise(bytes(), size(), collapse);
         return {};
     }
     // Linux before 5.14 cannot. For any other reason, touching a page may end the process.
