@@ -103,15 +103,11 @@ Expected<> WiringCommand::write_pictures(const std::string& directory) const {
     const auto write = [&](const std::string& name, const std::vector<Sheet>& sheets) {
         return write_whole_file(fmt::format("{}/wiring-{}.svg", directory, name), to_svg(sheets));
     };
-    for (const CameraCircuit& circuit : circuits().cameras)
-        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
-            return done;
-    for (const ImuCircuit& circuit : circuits().imus)
-        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
-            return done;
-    for (const LidarCircuit& circuit : circuits().lidars)
-        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
-            return done;
+    for (const char* group : {"cameras", "imus", "lidars"})
+        for (const json& row : circuits_json().at(group)) {
+            const auto name = row.at("name").get<std::string>();
+            if (auto done = write(name, drawings(*named_wiring({name}))); !done) return done;
+        }
     if (auto done = write("driven", {driven_outputs_drawing()}); !done) return done;
     return write("inverted", {inverted_trigger_drawing()});
 }

@@ -19,6 +19,8 @@ constexpr int device_left = 560;
 constexpr int device_right = 840;
 constexpr int pin_pitch = 26;
 constexpr int cameras_of_board = 4;
+/// Characters that fit below a drawing.
+constexpr std::size_t note_columns = 130;
 
 const char* colour(const std::string& kind) {
     if (kind == "output") return "#c0392b";
@@ -189,6 +191,16 @@ void Sheet::imu_wire(int y, const ImuWire& imu, int pull_up_x) {
     resistor(pull_up_x, top + 30, imu.pull_up_ohm, true);
     wire(pull_up_x - 9, top, pull_up_x + 9, top);
     add(text(pull_up_x, top - 6, named_level("3.3 V"), "#777", "middle"));
+}
+
+void Sheet::note(std::string text) {
+    while (text.size() > note_columns) {
+        const std::size_t blank = text.rfind(' ', note_columns);
+        if (blank == std::string::npos) break;
+        notes_.push_back(text.substr(0, blank));
+        text.erase(0, blank + 1);
+    }
+    notes_.push_back(std::move(text));
 }
 
 std::string Sheet::body() const {

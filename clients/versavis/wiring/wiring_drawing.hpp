@@ -24,7 +24,7 @@ class Sheet {
     void device_pin(int y, int number, const std::string& name, const std::string& below,
                     const std::string& kind);
     void open_pin(int y, int number, const std::string& what);
-    void note(std::string text) { notes_.push_back(std::move(text)); }
+    void note(std::string text);
     void end_at(int y) { bottom_ = y; }
 
     int height() const { return bottom_ + 24 + 18 * static_cast<int>(notes_.size()); }
