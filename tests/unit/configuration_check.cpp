@@ -810,7 +810,7 @@ TEST_CASE("configuration_check: no IMU is faster than the board can read it") {
     CHECK(fastest(1, uart_imu(0), 799'999) == 799'999);
 }
 
-TEST_CASE("configuration_check: whatever is accepted, the board takes") {
+TEST_CASE("configuration_check: whatever is accepted, the board takes", "[statistics]") {
     const test::TemporaryDirectory directory;
     directory.write("any.toml", "");
     std::mt19937 random(7);

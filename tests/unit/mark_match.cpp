@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gnss/mark_match.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdint>
 #include <random>
@@ -85,7 +86,7 @@ std::size_t right_pairs(const Drive& drive, const Expected<MarkMatch>& match) {
 std::size_t both(const Drive& drive) {
     std::size_t count = 0;
     for (const std::size_t mark : drive.mark_ticks)
-        count += std::count(drive.frame_ticks.begin(), drive.frame_ticks.end(), mark);
+        count += std::binary_search(drive.frame_ticks.begin(), drive.frame_ticks.end(), mark);
     return count;
 }
 
