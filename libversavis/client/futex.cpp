@@ -21,6 +21,17 @@ constexpr std::int64_t second_ns = 1'000'000'000;
 // an idle program; if higher, items of the other streams are seen later.
 constexpr std::int64_t blind_sleep_ns = 1'000'000;
 
+// Of <linux/futex.h> and <sys/syscall.h> since Linux 5.16, which may be older where this is
+// compiled than where it runs.
+constexpr long futex_waitv_number = 449;
+constexpr std::uint32_t futex_32 = 2;
+struct FutexWaiter {
+    std::uint64_t value;
+    std::uint64_t address;
+    std::uint32_t flags;
+    std::uint32_t reserved;
+};
+
 /// Kernels before 5.16 do not know of several words, and some containers do not let it through.
 bool cannot_wait_for_any(long result) {
     return result == -1 && (errno == ENOSYS || errno == EPERM);
@@ -39,14 +50,10 @@ void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
 }
 
 void futex_wait_any(const std::vector<FutexWord>& words, std::int64_t timeout_ns) {
-    std::array<futex_waitv, most_futex_words> waiters{};
+    std::array<FutexWaiter, most_futex_words> waiters{};
     const auto count = static_cast<std::ptrdiff_t>(std::min(words.size(), waiters.size()));
     std::transform(words.begin(), words.begin() + count, waiters.begin(), [](const FutexWord& one) {
-        futex_waitv waiter{};
-        waiter.val = one.value;
-        waiter.uaddr = reinterpret_cast<std::uintptr_t>(one.word);
-        waiter.flags = FUTEX_32;
-        return waiter;
+        return FutexWaiter{one.value, reinterpret_cast<std::uintptr_t>(one.word), futex_32, 0};
     });
     timespec until{};
     clock_gettime(CLOCK_MONOTONIC, &until);
@@ -55,8 +62,8 @@ void futex_wait_any(const std::vector<FutexWord>& words, std::int64_t timeout_ns
     until.tv_nsec = ns % second_ns;
     const long result = words.empty()
                             ? clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr)
-                            : syscall(SYS_futex_waitv, waiters.data(), static_cast<unsigned>(count),
-                                      0, &until, CLOCK_MONOTONIC);
+                            : syscall(futex_waitv_number, waiters.data(),
+                                      static_cast<unsigned>(count), 0, &until, CLOCK_MONOTONIC);
     if (cannot_wait_for_any(result))
         futex_wait(*words.front().word, words.front().value, std::min(timeout_ns, blind_sleep_ns));
 }
