@@ -51,7 +51,7 @@ def pack(root, archive):
 def start(image, archive, words, *options, memory_mb=256):
     """A machine without disk or display; the words are for its kernel and its first program."""
     return subprocess.Popen(
-        ["qemu-system-x86_64", "-M", "q35", "-cpu", "max,-arch-capabilities", "-m", str(memory_mb), "-nodefaults",
+        ["qemu-system-x86_64", "-M", "q35", "-cpu", "max", "-m", str(memory_mb), "-nodefaults",
          "-no-reboot", "-display", "none", "-serial", "stdio", "-kernel", image,
          "-initrd", archive, "-append", f"console=ttyS0 quiet panic=-1 {words}", *options],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
