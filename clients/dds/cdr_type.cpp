@@ -100,7 +100,9 @@ const ddsi_sertype_ops type_operations = [] {
 ddsi_sertype* make_cdr_type(const std::string& name) {
     auto* type = new ddsi_sertype{};
     ddsi_sertype_init(type, name.c_str(), &type_operations, &sample_operations, true);
+#ifdef DDS_DATA_REPRESENTATION_FLAG_XCDR1  // Cyclone DDS 0.8 knows no other
     type->allowed_data_representation = DDS_DATA_REPRESENTATION_FLAG_XCDR1;
+#endif
     return type;
 }
 

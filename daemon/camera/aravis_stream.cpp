@@ -205,8 +205,10 @@ void AravisStream::take(ArvBuffer* buffer) {
         frame.height = positive(arv_buffer_get_image_height(buffer));
         frame.pixel_format = arv_buffer_get_image_pixel_format(buffer);
         gint padding_x = 0;
+#if ARAVIS_CHECK_VERSION(0, 8, 23)  // which Ubuntu 22.04 has not
         gint padding_y = 0;
         arv_buffer_get_image_padding(buffer, &padding_x, &padding_y);
+#endif
         frame.padding_x = positive(padding_x);
         frame.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
         const double exposure_us =

@@ -398,7 +398,7 @@ void Board::align(const wire::AlignGrid& wanted) {
     const bool slew_possible =
         wanted.max_slew_ppb > 0 && wanted.max_slew_ppb <= wire::align_largest_slew_ppb;
     if (!in_reach || !pace_possible || !slew_possible)
-        return ignore({wire::LogLevel::warning, "align_grid is out of range: ignored"});
+        return ignore(wire::Log{wire::LogLevel::warning, "align_grid is out of range: ignored"});
     const Nanoseconds off = grid_clock_.misplaced(wanted.board_ns);
     if (any_running() || (off <= unseen_step && -off <= unseen_step)) {
         grid_clock_.align(wanted.board_ns, wanted.pace_ppb, wanted.max_slew_ppb, now);

@@ -86,7 +86,7 @@ void Board::take(const wire::TimeOutput& message) {
     if (possible(message, now))
         return time_outputs_[message.index].take(message, output_of(message.output), now);
     if (message.index < wire::time_output_count) time_outputs_[message.index].doubt();
-    ignore({wire::LogLevel::warning, "time_output is out of range or taken: ignored"});
+    ignore(wire::Log{wire::LogLevel::warning, "time_output is out of range or taken: ignored"});
 }
 
 bool Board::is_time_output(unsigned output) const {
