@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/process.hpp"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <climits>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <string>
 
@@ -37,10 +37,13 @@ std::string stat_of(std::uint32_t pid) {
     return line;
 }
 
-/// 0: there is no such file.
-std::uint64_t inode(const char* path) {
-    struct stat file {};
-    return ::stat(path, &file) == 0 ? file.st_ino : 0;
+/// The inode from a link such as "pid:[4026531836]", which a process may read where AppArmor denies
+/// it to look at the file itself. 0: there is no such namespace.
+std::uint64_t namespace_inode(const char* path) {
+    char link[64] = {};
+    if (::readlink(path, link, sizeof link - 1) < 0) return 0;
+    const char* number = std::strchr(link, '[');
+    return number == nullptr ? 0 : std::strtoull(number + 1, nullptr, 10);
 }
 
 /// 0: only the remains of a process.
@@ -81,7 +84,7 @@ Namespaces own_namespaces() {
     thread_local pid_t process = 0;
     thread_local Namespaces known{};
     if (const pid_t now = ::getpid(); now != process) {
-        known = {inode("/proc/self/ns/pid"), inode("/proc/self/ns/time")};
+        known = {namespace_inode("/proc/self/ns/pid"), namespace_inode("/proc/self/ns/time")};
         process = now;
     }
     return known;

@@ -48,14 +48,29 @@ def pack(root, archive):
                        stdout=file, check=True)
 
 
-def start(image, archive, words, *options, memory_mb=256):
+def start(image, archive, words, *options):
     """A machine without disk or display; the words are for its kernel and its first program."""
     return subprocess.Popen(
-        ["qemu-system-x86_64", "-M", "q35", "-cpu", "max", "-m", str(memory_mb), "-nodefaults",
+        ["qemu-system-x86_64", "-M", "q35", "-cpu", "max", "-m", "2048", "-nodefaults",
          "-no-reboot", "-display", "none", "-serial", "stdio", "-kernel", image,
          "-initrd", archive, "-append", f"console=ttyS0 quiet panic=-1 {words}", *options],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         errors="replace", bufsize=1)
+
+
+def start_board(build, socket):
+    """The firmware as it is flashed, emulated, whose USB is redirected to the socket."""
+    board = subprocess.Popen(
+        ["node", build / "emulator/usb_redirect.mjs", build / "firmware/versavis.uf2", socket],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+    if board.stdout.readline().strip() != "listening":
+        raise SystemExit("the emulated board does not start")
+    return board
+
+
+def with_board(socket):
+    return ["-chardev", f"socket,id=board,path={socket}", "-device", "qemu-xhci",
+            "-device", "usb-redir,chardev=board"]
 
 
 def follow(guest, limit_s, do=None):

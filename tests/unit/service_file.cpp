@@ -177,7 +177,8 @@ TEST_CASE("service_file: a folder or a file that cannot be read is an error") {
     std::filesystem::permissions(locked, std::filesystem::perms::none);
     if (::geteuid() != 0)
         CHECK(files.errors() ==
-              "v.toml.d/10.toml: cannot be opened; give the path of a readable file");
+              "v.toml.d/10.toml: cannot be opened: Permission denied; give the path of a "
+              "readable file");
     for (int i = 0; i < 100; ++i) files.add("f" + std::to_string(i) + ".toml", "");
     CHECK(files.errors() ==
           "v.toml.d: has more than 99 configuration files; make it a folder that the service can "

@@ -40,6 +40,12 @@ TEST_CASE("table_reader: what is no file is not read") {
     }
     CHECK(parse_toml("/nowhere/t.toml").error().message() ==
           "/nowhere/t.toml: there is no such file; give the path of a readable file");
+    const std::string loop = (directory.path() / "loop").string();
+    std::filesystem::create_symlink(loop, loop);
+    CHECK(parse_toml(loop).error().message() ==
+          loop +
+              ": cannot be opened: Too many levels of symbolic links; give the path of a "
+              "readable file");
 }
 
 TEST_CASE("table_reader: a file that is too large or too deep is refused before it is parsed") {

@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <numeric>
 #include <optional>
 #include <sstream>
+#include <system_error>
 
 namespace versavis {
 
@@ -137,12 +139,14 @@ Expected<std::string, TomlProblem> read_file(const std::string& path) {
     const char* give = "give the path of a readable file";
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status)) return refuse("there is no such file", give);
+    if (status.type() == std::filesystem::file_type::not_found)
+        return refuse("there is no such file", give);
+    if (error) return refuse("cannot be opened: " + error.message(), give);
     // Devices and pipes may have no end.
     if (!std::filesystem::is_regular_file(status)) return refuse("is not a regular file", give);
     std::ifstream file(path, std::ios::binary);
+    if (!file) return refuse("cannot be opened: " + std::generic_category().message(errno), give);
     std::string text(largest_file + 1, '\0');
-    if (!file) return refuse("cannot be opened", give);
     file.read(text.data(), static_cast<std::streamsize>(text.size()));
     if (file.bad()) return refuse("cannot be read", give);
     text.resize(static_cast<std::size_t>(file.gcount()));
