@@ -1,65 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Board and USB3 Vision camera on one simulated bus: the unmodified service, through the real
 // libusb and Aravis. Run under umockdev-wrapper.
-#include <umockdev.h>
-
 #include <catch2/catch.hpp>
 #include <thread>
 
 #include "../support/judged.hpp"
 #include "../support/stack.hpp"
-#include "board_host.hpp"
 #include "judge.hpp"
-#include "simulated_device.hpp"
-#include "u3v_camera.hpp"
-#include "usb_bridge.hpp"
+#include "usb_rig.hpp"
 
 using namespace versavis;
 using namespace versavis::test;
 
 namespace {
 
-/// The testbed must live in the process that runs under the wrapper: here board and camera do as
-/// well.
-class UsbRig {
- public:
-    explicit UsbRig(const Stack& stack)
-        : testbed_(umockdev_testbed_new()),
-          surroundings_(zero_, stack.scenario()),
-          truth_(std::move(*rig::GroundTruth::create(stack.truth_path()))),
-          world_{stack.scenario(), zero_, surroundings_, *truth_},
-          camera(std::make_shared<U3vCamera>(world_, stack.scenario().cameras[0])),
-          device(testbed_.get(), "1-2", camera),
-          board_(
-              std::move(*rig::BoardHost::create(world_, stack.socket_path(), {&camera->camera()}))),
-          bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
-
-    /// Another camera on the bus, which takes commands and never answers.
-    void add_mute(const Stack& stack) {
-        rig::CameraScenario settings = stack.scenario().cameras[0];
-        settings.serial = "MUTE";
-        mute_ = std::make_shared<U3vCamera>(world_, settings);
-        mute_->mute(true);
-        mute_device_ = std::make_unique<SimulatedDevice>(testbed_.get(), "1-3", mute_);
-    }
-
- private:
-    GObjectPtr<UMockdevTestbed> testbed_;
-    HostTime zero_ = host_now();
-    rig::Surroundings surroundings_;
-    std::unique_ptr<rig::GroundTruth> truth_;
-    rig::World world_;
-
- public:
-    std::shared_ptr<U3vCamera> camera;
-    SimulatedDevice device;
-
- private:
-    std::unique_ptr<rig::BoardHost> board_;
-    UsbBridge bridge_;
-    std::shared_ptr<U3vCamera> mute_;
-    std::unique_ptr<SimulatedDevice> mute_device_;
-};
+UsbRig rig_of(const Stack& stack) {
+    return {stack.scenario(), stack.socket_path(), stack.truth_path()};
+}
 
 void judge(const Stack& stack) {
     const rig::Verdict verdict = judged(stack, 3);
@@ -75,7 +32,7 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
     settings.devices = {"RIGCAM-cam0"};  // its serial number
     Stack stack(settings);
     {
-        UsbRig rig(stack);
+        UsbRig rig = rig_of(stack);
         stack.start_service();
         auto status = stack.wait_for_status(healthy);
         CHECK(status["cameras"][0]["serial"] == "RIGCAM-cam0");
@@ -107,8 +64,8 @@ TEST_CASE("usb: two entries for one camera beside a device that never answers en
     StackSettings settings{"u3vtwo", 33, 2, 20, "", "", "", 320, 240, "usb"};
     settings.devices = {"RIGCAM-cam0", "565673E09BCA"};  // its serial number, and its GUID
     Stack stack(settings);
-    UsbRig rig(stack);
-    rig.add_mute(stack);
+    UsbRig rig = rig_of(stack);
+    rig.add_mute(stack.scenario().cameras[0]);
     stack.start_service();
     stack.wait_for_status([](const auto& s) {
         unsigned streaming = 0;
@@ -141,8 +98,8 @@ TEST_CASE("usb: discover lists board and cameras, and disturbs no service that u
         "",        320, 240, "usb"};
     settings.devices = {"LISTED"};
     Stack stack(settings);
-    UsbRig rig(stack);
-    rig.add_mute(stack);
+    UsbRig rig = rig_of(stack);
+    rig.add_mute(stack.scenario().cameras[0]);
     const auto discover = [&] {
         std::string said;
         CHECK(stack.tool({"discover", "--json"}, &said) == 0);
