@@ -110,9 +110,11 @@ void CameraGroup::board_restarted() {
         if (unit.pipeline->triggered()) unit.pipeline->reset();
 }
 
-void CameraGroup::board_connected() {
+void CameraGroup::board_connected() { board_changed(0xFF); }
+
+void CameraGroup::board_changed(std::uint8_t outputs) {
     for (const Unit& unit : units_) {
-        if (!unit.pipeline->triggered()) continue;
+        if (!unit.pipeline->triggered() || (outputs >> unit.pipeline->output() & 1U) == 0) continue;
         unit.pipeline->reset();
         if (unit.camera->streaming()) start_streaming(unit, unit.pipeline->first_start());
     }

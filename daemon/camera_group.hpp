@@ -47,6 +47,8 @@ class CameraGroup {
 
     /// The board can trigger: whatever streams is started.
     void board_connected();
+    /// The board has other settings for the cameras at these outputs, and stopped them for it.
+    void board_changed(std::uint8_t outputs);
 
     /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);

@@ -155,12 +155,13 @@ void Service::reconfigure(const Configuration& configuration) {
                 nmea_.configure(place_of(directory_, configuration), configuration.ports.nmea_baud);
             !made)
             log(LogLevel::error, nmea_stream, "{}", made.error().message());
+    configuration_ = configuration;
+    // First the cameras: they are started as soon as the board has their settings.
+    cameras_->reconfigure(configuration.cameras);
     if (std::memcmp(&old_board, &new_board, sizeof new_board) != 0) {
         alignment_.reconfigure(new_board);
         board_->reconfigure(after);
     }
-    configuration_ = configuration;
-    cameras_->reconfigure(configuration.cameras);
 }
 
 void Service::ask(const std::string& camera, CameraWish wish) {
@@ -202,6 +203,12 @@ void Service::board_connected() {
     cameras_->board_connected();
 }
 
+void Service::cameras_changed(std::uint8_t outputs, std::uint8_t other_rate) {
+    ticks_.rate_changed(other_rate, host_now());
+    alignment_.begin();  // what was measured at other rates says nothing
+    cameras_->board_changed(outputs);
+}
+
 void Service::board_lost() { events_->add({EventKind::board_lost, EventReason::none, 0, "board"}); }
 
 /// Where the seconds lie, to the board's grid and its time outputs.
@@ -218,7 +225,7 @@ void Service::announce(HostTime now) {
 
 void Service::exposure(const wire::Exposure& record, HostTime received) {
     wire::Exposure numbered = record;
-    numbered.tick = ticks_.number(record.tick);
+    numbered.tick = ticks_.number(record.camera, record.tick);
     const auto stamp = cameras_->add(numbered, received);
     if (stamp) alignment_.exposure(record, stamp->output, received);
 }
@@ -255,8 +262,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     const EventSource source = source_of(event.kind);
     if (const auto count = skipped_triggers(event)) {
         cameras_->triggers_skipped(event.source, count);
-        entry->value =
-            static_cast<std::int64_t>(ticks_.number(static_cast<std::uint64_t>(event.value)));
+        entry->value = static_cast<std::int64_t>(
+            ticks_.number(event.source, static_cast<std::uint64_t>(event.value)));
     }
     if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "base/thread_watch.hpp"
+#include "board/camera_change.hpp"
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_file.hpp"
 #include "posix/thread.hpp"
@@ -101,17 +102,15 @@ void BoardLink::reconfigure(const Configuration& configuration) {
     {
         const std::lock_guard lock(command_mutex_);
         next_file_ = configuration;
-        takes_commands_ = false;
-        commands_.clear();
         accepting_ = false;
-        greet_anew_ = true;
+        changes_ = true;
     }
     wake_.signal();
 }
 
 void BoardLink::adopt_configuration() {
     const std::lock_guard lock(command_mutex_);
-    greet_anew_ = false;
+    changes_ = false;
     if (!next_file_) return;
     file_ = *std::exchange(next_file_, std::nullopt);
     const std::uint32_t id = configuration_.id;
@@ -206,7 +205,7 @@ Expected<> BoardLink::converse() {
     listener_.board_synchronised();
     if (auto sent = send_commands(); !sent) return sent;
     connected_ = true;
-    accepting_ = true;
+    accept_starts();
     listener_.board_connected();
     while (!stop_) {
         if (auto sent = send_commands(); !sent) return sent;
@@ -216,8 +215,8 @@ Expected<> BoardLink::converse() {
                                       std::max(clock_.next_request() - host_now(), shortest_wait)));
             !done)
             return done;
-        anew_ = greet_anew_;
-        if (anew_) return failure("board", "its configuration changes");
+        if (changes_)
+            if (auto changed = change(); !changed) return changed;
         anew_ = host_now() - last_packet_ > silence_limit;
         if (anew_) return failure("board", "went silent", "check cable and power");
     }
@@ -268,11 +267,45 @@ Expected<> BoardLink::configure() {
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
+    if (answer_.status == wire::ConfigurationStatus::running &&
+        (configuration_.flags & wire::configuration_cameras) != 0) {
+        anew_ = true;
+        return failure("board", "its configuration changes");
+    }
     refusals_.emplace_back(answer_.status == wire::ConfigurationStatus::running
                                ? "its cameras are already running: reset the board"
                                : "change the configuration");
     set_state(BoardState::refused, fmt::format("{}", fmt::join(refusals_, "; ")));
     return failure("board", "refused the configuration");
+}
+
+/// What differs in the new configuration, if that can be while cameras run. Otherwise the
+/// conversation ends, and the next one begins with it.
+Expected<> BoardLink::change() {
+    const wire::Configuration before = configuration_;
+    adopt_configuration();
+    const bool able = (greeting_.hello.capabilities & wire::capability_camera_change) != 0;
+    const CameraChange change = able ? camera_change(before, configuration_) : CameraChange{};
+    if (change.outputs == 0) {
+        anew_ = true;
+        return failure("board", "its configuration changes");
+    }
+    if (auto sent = send(wire::Stop{change.outputs, {}}); !sent) return sent;
+    configuration_.flags |= wire::configuration_cameras;
+    auto done = configure();
+    configuration_.flags &= ~std::uint32_t{wire::configuration_cameras};
+    if (!done) return done;
+    const std::uint8_t missed = accept_starts();
+    listener_.cameras_changed(static_cast<std::uint8_t>(change.outputs | missed),
+                              change.other_rate);
+    return {};
+}
+
+/// Returns those that were not taken before.
+std::uint8_t BoardLink::accept_starts() {
+    const std::lock_guard lock(command_mutex_);
+    accepting_ = !changes_;
+    return accepting_ ? std::exchange(missed_starts_, 0) : 0;
 }
 
 /// A few exchanges in a row, so that the first frame can be stamped.
@@ -481,11 +514,18 @@ Expected<> BoardLink::send_commands() {
 }
 
 void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
-    if (!accepting_) return;  // board_connected() starts what streams by then
     wire::Start message{};
     message.cameras = mask;
     if (how == pairing::Start::pattern) message.flags = wire::start_pattern;
     if (how == pairing::Start::slow) message.flags = wire::start_slow;
+    {
+        const std::lock_guard lock(command_mutex_);
+        // board_connected() or cameras_changed() starts what streams by then.
+        if (!accepting_) {
+            missed_starts_ |= mask;
+            return;
+        }
+    }
     give(message);
 }
 

@@ -36,6 +36,9 @@ class BoardListener {
     board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
     virtual void board_synchronised() = 0;  ///< its clock is known; no camera can be started yet
     virtual void board_connected() = 0;     ///< configured, its clock known: cameras may be started
+    /// Cameras of these outputs were stopped and have other settings, `other_rate` another rate;
+    /// they may be started. Nothing else changed.
+    virtual void cameras_changed(std::uint8_t outputs, std::uint8_t other_rate) = 0;
     virtual void board_lost() = 0;
     virtual void exposure(const wire::Exposure& record, HostTime received) = 0;
     /// False: the sample is doubted, and nothing may be made of its times.
@@ -83,8 +86,10 @@ class BoardLink {
     void start();
     void stop();
 
-    /// The board is greeted anew with another configuration, which stops its cameras until
-    /// board_connected(). From any thread.
+    /// The board gets another configuration. If it changes settings of cameras alone, the board
+    /// can do so and ticks stay equal among cameras of one rate, these are stopped until
+    /// cameras_changed(). Else the board is greeted anew, which stops all until board_connected().
+    /// From any thread.
     void reconfigure(const Configuration& configuration);
 
     /// Starts or stops triggering the cameras of the mask, if the board is there. From any thread.
@@ -114,6 +119,8 @@ class BoardLink {
     Expected<> handshake();
     void adopt_configuration();
     Expected<> configure();
+    Expected<> change();
+    std::uint8_t accept_starts();
     Expected<> synchronise();
     Expected<> read(Duration timeout);
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
@@ -145,7 +152,8 @@ class BoardLink {
     std::vector<Command> commands_;  ///< to be sent by the link's thread, so that no other waits
     bool takes_commands_ = false;
     std::optional<Configuration> next_file_;  ///< to be adopted; under the same lock
-    std::atomic<bool> greet_anew_{false};     ///< because of it
+    std::uint8_t missed_starts_ = 0;          ///< of cameras, while none was taken; the same lock
+    std::atomic<bool> changes_{false};        ///< next_file_ is there
 
     // Of the link's thread.
     std::unique_ptr<ByteStream> stream_;

@@ -12,10 +12,10 @@ namespace versavis::daemon {
 namespace {
 
 /// Between messages to the board.
-constexpr Duration interval = seconds(1);
+constexpr Duration alignment_interval = seconds(1);
 
 /// With a worse clock, nothing is sent to the board.
-constexpr Duration largest_sigma = milliseconds(1);
+constexpr Duration largest_grid_sigma = milliseconds(1);
 
 /// Exposures whose median is the grid's error.
 constexpr std::size_t errors_kept = 9;
@@ -50,13 +50,13 @@ std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Trans
     const std::lock_guard lock(mutex_);
     if (!wanted_ || now < next_) return std::nullopt;
     const auto second = translator.next_second(now);
-    const bool known = second && second->sigma < largest_sigma &&
+    const bool known = second && second->sigma < largest_grid_sigma &&
                        (second->state == clock::ClockState::locked ||
                         second->state == clock::ClockState::converging);
     if (!known) return std::nullopt;
     const auto pace_ppb = pace_.add(*second);
     if (!pace_ppb) return std::nullopt;
-    next_ = now + interval;
+    next_ = now + alignment_interval;
     updated_ = now;
     return wire::AlignGrid{second->board.ns, *pace_ppb, max_slew_ppb_};
 }

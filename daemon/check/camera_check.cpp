@@ -60,6 +60,7 @@ class Recorder final : public BoardListener {
     void board_restarted() override { set_connected(false); }
     void board_synchronised() override {}
     void board_connected() override { set_connected(true); }
+    void cameras_changed(std::uint8_t /*outputs*/, std::uint8_t /*other_rate*/) override {}
     void board_lost() override { set_connected(false); }
     void exposure(const wire::Exposure& record, HostTime /*received*/) override {
         const std::lock_guard lock(mutex_);

@@ -30,6 +30,8 @@ constexpr Nanoseconds longest_wait = 200'000'000;
 /// Between stray edges that are reported; all are counted.
 constexpr Nanoseconds stray_interval = 100'000'000;
 
+constexpr std::uint8_t all_cameras = (1U << camera_count) - 1;
+
 /// Bounds the work of one poll. If lower, bytes of the host wait longer; if higher, polls take
 /// longer.
 constexpr unsigned packets_a_poll = 4;
@@ -38,7 +40,8 @@ constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
     wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
-    wire::capability_nmea | wire::capability_time_output | wire::capability_sentences;
+    wire::capability_nmea | wire::capability_time_output | wire::capability_sentences |
+    wire::capability_camera_change;
 
 /// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. If lower,
 /// contacts that bounce count double.
@@ -47,6 +50,14 @@ constexpr EchoFilter pps_echo(1'000'000);
 /// Of the auxiliary inputs. If lower, contacts that bounce count double; if higher, pulses of 20
 /// kHz are lost.
 constexpr EchoFilter aux_echo(10'000);
+
+/// Those that the parts really have.
+void use_true_rates(wire::Configuration& configuration) {
+    configuration.imus[0].rate_millihertz = SpiImu::true_rate(configuration.imus[0]);
+    wire::ImuConfiguration& uart = configuration.imus[1];
+    if (uart.kind != wire::ImuKind::none)
+        uart.rate_millihertz = Vn100::true_rate(uart.rate_millihertz);
+}
 
 }  // namespace
 
@@ -95,7 +106,7 @@ void Board::poll() {
     poll_storage(now);
     poll_health(now);
     if (transmitter_.pump()) more_ = true;
-    if (configuring_ && outputs_.empty() && (all_idle() || now >= configure_at_)) more_ = true;
+    if (configuring_ && may_change(now) && (changing_ != 0 || outputs_.empty())) more_ = true;
     polled_ = hal_.clock.now();
     const Nanoseconds took = polled_ - (due_ < began && due_ != 0 ? due_ : began);
     if (took > health_.loop_max_ns) health_.loop_max_ns = static_cast<std::uint32_t>(took);
@@ -199,7 +210,7 @@ void Board::greet(const wire::HostHello& hello) {
     // A board of another major version still identifies itself, so that the host can report what to
     // update.
     greeted_ = true;
-    if (configuring_) begin_trains(hal_.clock.now());
+    if (configuring_ && changing_ == 0) begin_trains(hal_.clock.now());
     configuring_ = false;
     stop(0xFF);
     transmitter_.begin();
@@ -228,21 +239,37 @@ wire::BoardHello Board::introduction() const {
 
 void Board::configure(const wire::Configuration& configuration) {
     refused_ = 0;
-    if (any_running())
+    const bool some = (configuration.flags & wire::configuration_cameras) != 0;
+    const std::uint8_t cameras = some ? changeable(configuration) : std::uint8_t{0};
+    if (some ? cameras == 0 : any_running())
         return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
     checked_id_ = configuration.id;
     check(configuration, hal_.facts, *this);
     if (refused_ != 0)
         return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
     wanted_ = configuration;
-    on_sync_ = {};
+    on_sync_.cameras = static_cast<std::uint8_t>(some ? on_sync_.cameras & ~cameras : 0);
     // Pulses already decided, and their exposures, end first: none is cut short, and each gets its
     // record.
-    sync_.stop();
-    test_.stop();
+    if (!some) {
+        sync_.stop();
+        test_.stop();
+    }
+    changing_ = cameras;
     configuring_ = true;
     more_ = true;
     configure_at_ = hal_.clock.now() + longest_wait;
+}
+
+/// Which stopped cameras it changes, if it changes nothing else that is in force, or will be.
+std::uint8_t Board::changeable(const wire::Configuration& configuration) const {
+    if (configuring_ || (configuration.flags & wire::configuration_store) != 0) return 0;
+    wire::Configuration wanted = configuration;
+    use_true_rates(wanted);
+    const std::uint8_t cameras = wire::changed_cameras(configuration_, wanted);
+    for (unsigned i = 0; i < camera_count; ++i)
+        if ((cameras >> i & 1U) != 0 && cameras_[i].running()) return 0;
+    return cameras;
 }
 
 void Board::refuse(const wire::Refusal& refusal) {
@@ -267,21 +294,14 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     apply_imus(configuration, now);
     configuration_ = configuration;
     apply_nmea();
-    for (std::size_t port = 0; port < wire::imu_count; ++port) {
-        wire::ImuConfiguration& imu = configuration_.imus[port];
-        imu.rate_millihertz = port == 0 ? SpiImu::true_rate(imu)
-                              : imu.kind == wire::ImuKind::none
-                                  ? imu.rate_millihertz
-                                  : Vn100::true_rate(imu.rate_millihertz);
-    }
+    use_true_rates(configuration_);
     std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
     masters_ = 0;
     for (unsigned i = 0; i < camera_count; ++i) {
         cameras_[i].stop();  // a slave may still run
         cameras_[i].give_up();
-        const bool lit = (configuration.illumination.cameras >> i & 1U) != 0;
-        cameras_[i].configure(configuration.cameras[i],
-                              lit ? configuration.illumination.lead_ns : 0);
+        configure_camera(i);
+        cameras_[i].grid_began();
         // Before any trigger, and not so soon that a port whose words take time is late.
         if (!is_time_output(i))
             outputs_.rest(i, cameras_[i].trigger_inverted(), now + OutputQueue::horizon);
@@ -302,6 +322,23 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     grid_clock_.begin(now, 0);
     apply_routes(true);
     begin_trains(now);
+}
+
+void Board::configure_camera(unsigned camera) {
+    const wire::IlluminationConfiguration& light = configuration_.illumination;
+    const bool lit = (light.cameras >> camera & 1U) != 0;
+    cameras_[camera].configure(configuration_.cameras[camera], lit ? light.lead_ns : 0);
+}
+
+/// The grid and all other cameras go on.
+void Board::change_cameras() {
+    for (unsigned i = 0; i < camera_count; ++i) {
+        if ((changing_ >> i & 1U) == 0) continue;
+        configuration_.cameras[i] = wanted_.cameras[i];
+        cameras_[i].give_up();
+        configure_camera(i);
+    }
+    configuration_.id = wanted_.id;
 }
 
 /// An IMU whose settings did not change keeps sampling.
@@ -372,10 +409,16 @@ bool Board::any_running() const {
     return slaves_ != 0;
 }
 
-bool Board::all_idle() const {
-    for (const CameraChannel& camera : cameras_)
-        if (!camera.idle() || camera.running()) return false;
+bool Board::idle(std::uint8_t cameras) const {
+    for (unsigned i = 0; i < camera_count; ++i)
+        if ((cameras >> i & 1U) != 0 && (!cameras_[i].idle() || cameras_[i].running()))
+            return false;
     return true;
+}
+
+/// A stuck exposure line is not waited for.
+bool Board::may_change(Nanoseconds now) const {
+    return idle(changing_ != 0 ? changing_ : all_cameras) || now >= configure_at_;
 }
 
 void Board::start(const wire::Start& start) {
@@ -479,13 +522,17 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
 }
 
 void Board::poll_configuration(Nanoseconds now) {
-    if (!all_idle() && now < configure_at_) return;
-    light_.stop(now);
-    for (const unsigned output : {output_sync, output_test})
-        if (!is_time_output(output)) outputs_.rest(output, false, now);
-    if (!outputs_.empty()) return;
+    if (!may_change(now)) return;
+    if (changing_ == 0) {
+        light_.stop(now);
+        for (const unsigned output : {output_sync, output_test})
+            if (!is_time_output(output)) outputs_.rest(output, false, now);
+        if (!outputs_.empty()) return;
+        apply(wanted_, now);
+    } else {
+        change_cameras();
+    }
     configuring_ = false;
-    apply(wanted_, now);
     if ((wanted_.flags & wire::configuration_store) != 0)
         storing_ =
             hal_.persist.store(reinterpret_cast<const std::uint8_t*>(&wanted_), sizeof wanted_);

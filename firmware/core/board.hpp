@@ -72,6 +72,10 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     wire::BoardHello introduction() const;
     void configure(const wire::Configuration& configuration);
     void apply(const wire::Configuration& configuration, Nanoseconds now);
+    void configure_camera(unsigned camera);
+    void change_cameras();
+    std::uint8_t changeable(const wire::Configuration& configuration) const;
+    bool may_change(Nanoseconds now) const;
     void apply_imus(const wire::Configuration& configuration, Nanoseconds now);
     Routing::Switched apply_routes(bool force);
     void apply_nmea();
@@ -92,7 +96,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void edges_lost(std::uint32_t lines);
     void follow_sync(Nanoseconds at);
     bool any_running() const;
-    bool all_idle() const;
+    bool idle(std::uint8_t cameras) const;
     template <class T>
     void send(const T& message);
 
@@ -109,6 +113,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     std::uint8_t masters_ = 0;   ///< cameras that slaves follow
     std::uint8_t slaves_ = 0;    ///< slaves that are to run
     std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
+    std::uint8_t changing_ = 0;  ///< cameras that the new configuration changes; 0: all is new
     wire::Start on_sync_{};      ///< waits for a sync pulse
     std::uint32_t checked_id_ = 0;
     std::uint32_t event_sequence_ = 0;

@@ -27,9 +27,9 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 }  // namespace
 
 void CameraChannel::configure(const wire::CameraConfiguration& configuration, Nanoseconds lead) {
+    if (configuration.rate_uhz != configuration_.rate_uhz) next_tick_ = 0;
     configuration_ = configuration;
     lead_ = max(lead - configuration.latency_ns, 0);
-    next_tick_ = 0;
     expected_ = min(configuration.exposure_ns, configuration.max_exposure_ns);
     announcements_.clear();
     routed_from_ = routed_until_ = never;

@@ -25,8 +25,8 @@ class CameraChannel {
           reports_(reports),
           tracker_(camera, reports) {}
 
-    /// Only while stopped and idle. Numbers continue. Triggers are decided `lead` sooner than the
-    /// outputs require.
+    /// Only while stopped and idle. Numbers continue, and ticks of the same rate. Triggers are
+    /// decided `lead` sooner than the outputs require.
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds lead);
 
     /// Begins triggering at the first grid point that can be met after `now`; flags:

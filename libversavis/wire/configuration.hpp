@@ -3,6 +3,9 @@
 // (docs/contracts/wire-protocol.md); freestanding C++17.
 #pragma once
 
+#include <cstddef>
+#include <cstring>
+
 #include "wire/type.hpp"
 
 namespace versavis::wire {
@@ -109,9 +112,12 @@ struct PortConfiguration {
 enum ConfigurationFlag : std::uint32_t {
     configuration_store =
         1U << 0U,  ///< also in force after the next power-up, before any host says so
+    configuration_cameras =
+        1U << 1U,  ///< changes cameras that are stopped; grid and all others go on
 };
 
-/// The whole configuration; accepted as a whole or not at all, and only while stopped.
+/// The whole configuration; accepted as a whole or not at all. Without configuration_cameras only
+/// while all cameras are stopped.
 struct Configuration {
     static constexpr Type type = Type::configuration;
     std::uint32_t id;     ///< repeated in the answer
@@ -121,6 +127,28 @@ struct Configuration {
     IlluminationConfiguration illumination;
     PortConfiguration ports;
 };
+
+/// Mask of the cameras in which `wanted` differs, if they may change while others run: their flags
+/// stay, they are no slaves and have none, and nothing else differs. Both have IMU rates of the
+/// same kind, asked for or true. 0: nothing differs, or more.
+inline std::uint8_t changed_cameras(const Configuration& in_force, const Configuration& wanted) {
+    std::uint8_t changed = 0;
+    std::uint8_t masters = 0;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        const CameraConfiguration& old = in_force.cameras[i];
+        const CameraConfiguration& camera = wanted.cameras[i];
+        const bool follows = (old.flags & camera_slave) != 0;
+        if (follows) masters = static_cast<std::uint8_t>(masters | 1U << old.master);
+        if (std::memcmp(&old, &camera, sizeof camera) == 0) continue;
+        if (follows || (old.flags & camera_enabled) == 0 || old.flags != camera.flags) return 0;
+        changed = static_cast<std::uint8_t>(changed | 1U << i);
+    }
+    static_assert(offsetof(Configuration, ports) + sizeof(PortConfiguration) ==
+                  sizeof(Configuration));
+    const bool others = std::memcmp(&in_force.imus, &wanted.imus,
+                                    sizeof wanted - offsetof(Configuration, imus)) != 0;
+    return others || (changed & masters) != 0 ? std::uint8_t{0} : changed;
+}
 
 enum class ConfigurationPart : std::uint8_t { camera = 0, imu = 1, illumination = 2, ports = 3 };
 

@@ -48,8 +48,9 @@ enum Capability : std::uint32_t {
     capability_imu_output = 1U << 7U,
     capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
     capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART label the pulses of the PPS input
-    capability_time_output = 1U << 10U,  ///< it sends pulses and NMEA sentences itself
-    capability_sentences = 1U << 11U,    ///< it hands on what a GNSS receiver at the UART sends
+    capability_time_output = 1U << 10U,    ///< it sends pulses and NMEA sentences itself
+    capability_sentences = 1U << 11U,      ///< it hands on what a GNSS receiver at the UART sends
+    capability_camera_change = 1U << 12U,  ///< it takes configuration_cameras
 };
 
 /// What a board has pins and peripherals for.

@@ -12,7 +12,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 namespace versavis::wire {
 
 inline constexpr std::uint8_t protocol_major = 3;
-inline constexpr std::uint8_t protocol_minor = 2;
+inline constexpr std::uint8_t protocol_minor = 3;
 inline constexpr std::size_t camera_count = 4;
 
 /// `no_time` in a time field: the instant was not observed.

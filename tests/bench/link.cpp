@@ -49,6 +49,7 @@ class Work final : public BoardListener {
     void board_restarted() override {}
     void board_synchronised() override {}
     void board_connected() override { connected_ = true; }
+    void cameras_changed(std::uint8_t /*outputs*/, std::uint8_t /*other_rate*/) override {}
     void board_lost() override {}
     void exposure(const wire::Exposure& record, HostTime received) override {
         if (record.camera < cameras_.size()) cameras_[record.camera]->add(record, received);
@@ -127,6 +128,9 @@ struct Idle final : BoardListener {
     void board_restarted() override {}
     void board_synchronised() override {}
     void board_connected() override { work.board_connected(); }
+    void cameras_changed(std::uint8_t outputs, std::uint8_t other_rate) override {
+        work.cameras_changed(outputs, other_rate);
+    }
     void board_lost() override {}
     void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {

@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
+#include <functional>
 
 #include "board_bench.hpp"
 #include "world.hpp"
@@ -110,7 +111,7 @@ TEST_CASE("board: its hello names the port, the firmware and this life") {
     CHECK(hello.minor == wire::protocol_minor);
     CHECK(hello.cameras == 3);
     CHECK(hello.reset_cause == wire::ResetCause::watchdog);
-    CHECK(hello.capabilities == 0xFFF);
+    CHECK(hello.capabilities == 0x1FFF);
     CHECK(hello.board_time_ns == 7 * second);
     CHECK(hello.present == port.facts.present);
     CHECK(hello.fastest_imu_millihertz == 1'234);
@@ -304,4 +305,155 @@ TEST_CASE("board: health reports what its inputs, its outputs and the link count
         CHECK(bench.health().glitches - before >= 1);
         CHECK(bench.health().glitches - before <= 2);
     }
+}
+
+namespace {
+
+/// Cameras 0 and 1 run; the second of them stops, and the configuration is to change it. If it has
+/// an exposure line, it exposes.
+struct ChangingCamera : Cameras {
+    explicit ChangingCamera(std::uint32_t flags = wire::camera_no_strobe) : Cameras(2, flags) {
+        configuration.ports.sync_rate_uhz = 10'000'000;
+        configuration.cameras[1].max_exposure_ns = 150 * ms;
+        add_imus(*this, 0);
+        configure();
+        send(wire::Start{3, 0, {}});
+        run(998 * ms);
+        if (flags == 0) edge(1, 998 * ms);
+        run(1'010 * ms);
+        send(wire::Stop{2, {}});
+        configuration.flags = wire::configuration_cameras;
+    }
+    wire::ConfigurationAnswer change() {
+        const std::size_t before = all<wire::ConfigurationAnswer>().size();
+        ++configuration.id;
+        send(configuration);
+        run_for(250 * ms);
+        const auto answers = all<wire::ConfigurationAnswer>();
+        REQUIRE(answers.size() == before + 1);
+        CHECK(answers.back().id == configuration.id);
+        return answers.back();
+    }
+    /// Ticks of its records with a trigger from `begin` on.
+    std::vector<std::uint64_t> ticks(unsigned camera, Nanoseconds begin) const {
+        std::vector<std::uint64_t> found;
+        for (const auto& record : all<wire::Exposure>())
+            if (record.camera == camera && record.trigger_ns >= begin) found.push_back(record.tick);
+        return found;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("board: a stopped camera changes while others run, and nothing else is touched") {
+    ChangingCamera bench;
+    wire::CameraConfiguration& camera = bench.configuration.cameras[1];
+    camera.rate_uhz = 40'000'000;
+    camera.exposure_ns = 2 * ms;
+    const unsigned disarmed = bench.port.disarmed;
+    bench.send(bench.configuration);
+    bench.run_for(60 * ms);
+    CHECK(bench.port.disarmed == disarmed);  // no IMU is set up
+    const wire::ConfigurationAnswer answer = bench.all<wire::ConfigurationAnswer>().back();
+    CHECK(answer.status == wire::ConfigurationStatus::taken);
+    CHECK(answer.taken.cameras[1].rate_uhz == 40'000'000);
+    CHECK(answer.taken.cameras[0].rate_uhz == 20'000'000);
+    CHECK(answer.origin_ns == 0);
+    const Nanoseconds begin = bench.port.time;
+    bench.send(wire::Start{2, 0, {}});
+    bench.run(begin + second);
+    bench.send(wire::Stop{3, {}});
+    bench.run_for(100 * ms);
+    // Points of the same grid at its own rate; the middles of both lie on them.
+    const auto ticks = bench.ticks(1, begin);
+    REQUIRE(ticks.size() >= 38);
+    const auto records = bench.all<wire::Exposure>();
+    for (const auto& record : records)
+        if (record.camera == 1 && record.trigger_ns >= begin)
+            CHECK(record.trigger_ns == static_cast<Nanoseconds>(record.tick) * 25 * ms - ms);
+    // The other camera and the sync output had no pause.
+    const auto others = bench.ticks(0, 0);
+    for (std::size_t i = 1; i < others.size(); ++i) CHECK(others[i] == others[i - 1] + 1);
+    const auto pulses = bench.pulses(output_sync);
+    for (std::size_t i = 1; i < pulses.size(); ++i) CHECK(pulses[i] - pulses[i - 1] == 100 * ms);
+    CHECK(pulses.size() >= 20);
+}
+
+TEST_CASE("board: a camera that changes at the same rate uses no tick twice") {
+    ChangingCamera bench;
+    bench.configuration.cameras[1].phase_ns = 49'000'000;
+    const std::uint64_t before = bench.ticks(1, 0).back();
+    bench.send(bench.configuration);
+    const Nanoseconds begin = bench.port.time;
+    bench.send(wire::Start{2, 0, {}});
+    bench.run(begin + second);
+    const auto ticks = bench.ticks(1, begin);
+    REQUIRE(ticks.size() > 10);
+    CHECK(ticks.front() > before);
+}
+
+TEST_CASE("board: a change of a camera waits for its exposure that is under way") {
+    ChangingCamera bench(0);
+    bench.configuration.cameras[1].exposure_ns = 2 * ms;
+    bench.send(bench.configuration);
+    bench.run_for(30 * ms);
+    CHECK(bench.all<wire::ConfigurationAnswer>().size() == 1);
+    bench.edge(1, bench.port.time, false);
+    bench.run_for(ms);
+    CHECK(bench.all<wire::ConfigurationAnswer>().size() == 2);
+}
+
+TEST_CASE("board: what is not a change of stopped cameras alone needs all to stop") {
+    const auto refused = [](const std::function<void(ChangingCamera&)>& alter) {
+        ChangingCamera bench;
+        bench.configuration.cameras[1].exposure_ns = 2 * ms;
+        alter(bench);
+        const wire::ConfigurationAnswer answer = bench.change();
+        CHECK(answer.taken.cameras[1].exposure_ns == 4 * ms);
+        return answer.status == wire::ConfigurationStatus::running;
+    };
+    CHECK_FALSE([&] {
+        ChangingCamera bench;
+        bench.configuration.cameras[1].exposure_ns = 2 * ms;
+        return bench.change().status == wire::ConfigurationStatus::running;
+    }());
+    CHECK(refused([](auto& bench) { bench.send(wire::Start{2, 0, {}}); }));
+    CHECK(refused([](auto& bench) { bench.configuration.cameras[0].exposure_ns = 2 * ms; }));
+    CHECK(refused([](auto& bench) {
+        bench.configuration.cameras[1].flags |= wire::camera_trigger_inverted;
+    }));
+    CHECK(refused([](auto& bench) { bench.configuration.cameras[1].flags = 0; }));
+    CHECK(refused([](auto& bench) { bench.add_camera(2); }));
+    CHECK(refused([](auto& bench) { bench.configuration.imus[0].rate_millihertz = 200'000; }));
+    CHECK(refused([](auto& bench) { bench.configuration.illumination.max_on_ns = 20'000; }));
+    CHECK(refused([](auto& bench) { bench.configuration.ports.test = wire::test_camera0; }));
+    CHECK(refused([](auto& bench) { bench.configuration.flags |= wire::configuration_store; }));
+    CHECK(refused([](auto& bench) { bench.configuration.cameras[1].exposure_ns = 4 * ms; }));
+    // A camera that slaves follow.
+    ChangingCamera bench(0);
+    bench.send(wire::Stop{3, {}});
+    bench.run_for(250 * ms);
+    bench.configuration.flags = 0;
+    bench.add_slave(2, 1);
+    bench.configure();
+    bench.configuration.flags = wire::configuration_cameras;
+    bench.configuration.cameras[1].exposure_ns = 2 * ms;
+    CHECK(bench.change().status == wire::ConfigurationStatus::running);
+}
+
+TEST_CASE("board: a change of a camera out of range is refused") {
+    ChangingCamera bench;
+    bench.configuration.cameras[1].rate_uhz = 1;
+    CHECK(bench.change().status == wire::ConfigurationStatus::refused);
+}
+
+TEST_CASE("board: a hello drops a change of a camera that waits, and pulses go on") {
+    ChangingCamera bench(0);
+    bench.configuration.cameras[1].rate_uhz = 40'000'000;
+    bench.send(bench.configuration);
+    bench.greet();
+    bench.run_for(500 * ms);
+    CHECK(bench.all<wire::ConfigurationAnswer>().size() == 1);
+    const auto pulses = bench.pulses(output_sync);
+    for (std::size_t i = 1; i < pulses.size(); ++i) CHECK(pulses[i] - pulses[i - 1] == 100 * ms);
 }

@@ -185,14 +185,22 @@ class LinkListener final : public BoardListener {
         unsigned lost = 0;
         unsigned samples = 0;
         unsigned exposures = 0;
+        unsigned changed = 0;
     };
 
     std::function<void()> synchronised = [] {};
+    std::pair<std::uint8_t, std::uint8_t> changes;  ///< the newest
+    std::vector<std::uint64_t> ticks;               ///< of camera 0; the link's thread adds to it
     void board_restarted() override { count(&Counts::restarted); }
     void board_synchronised() override { synchronised(); }
     void board_connected() override { count(&Counts::connected); }
+    void cameras_changed(std::uint8_t outputs, std::uint8_t other_rate) override {
+        changes = {outputs, other_rate};
+        count(&Counts::changed);
+    }
     void board_lost() override { count(&Counts::lost); }
-    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {
+    void exposure(const wire::Exposure& record, HostTime /*received*/) override {
+        if (record.camera == 0) ticks.push_back(record.tick);
         count(&Counts::exposures);
     }
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
@@ -409,6 +417,62 @@ TEST_CASE("board_link: a board that reboots while the link stays open is back wi
         CHECK(listener.counts().restarted == life + 1);
         CHECK(listener.counts().lost == life);
     }
+}
+
+namespace {
+
+/// Triggered at 50 Hz, but for the second one.
+Configuration two_cameras(double second_hz) {
+    Configuration configuration;
+    for (unsigned i = 0; i < 2; ++i) {
+        CameraConfiguration camera;
+        camera.name = "cam" + std::to_string(i);
+        camera.output = i;
+        camera.rate_hz = i == 0 ? 50 : second_hz;
+        camera.max_exposure_us = 10'000;
+        camera.strobe = Strobe::none;
+        configuration.cameras.push_back(camera);
+    }
+    return configuration;
+}
+
+}  // namespace
+
+TEST_CASE("board_link: settings of one camera change while another is triggered") {
+    LinkClock clock;
+    LinkListener listener;
+    BoardLink link(
+        []() -> Expected<std::unique_ptr<ByteStream>> { return std::make_unique<NativeStream>(); },
+        two_cameras(50), 10, clock.translator, clock.recorder, listener);
+    link.start();
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
+    link.start_cameras(0b11, pairing::Start::steady);
+    REQUIRE(listener.wait(&LinkListener::Counts::exposures, 20));
+    link.reconfigure(two_cameras(20));
+    link.start_cameras(0b10, pairing::Start::steady);  // too early: whoever hears of it starts it
+    REQUIRE(listener.wait(&LinkListener::Counts::changed, 1));
+    CHECK(listener.changes == std::pair<std::uint8_t, std::uint8_t>(0b10, 0b10));
+    const unsigned before = listener.counts().exposures;
+    REQUIRE(listener.wait(&LinkListener::Counts::exposures, before + 20));
+    // Back to the rate, and so to the ticks, of the other one.
+    link.reconfigure(two_cameras(50));
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 2));
+    CHECK(listener.counts().lost == 1);
+    link.stop();
+    CHECK(listener.counts().changed == 1);
+    CHECK(listener.counts().restarted == 1);
+    REQUIRE(listener.ticks.size() > 20);
+    for (std::size_t i = 1; i < listener.ticks.size(); ++i)
+        CHECK(listener.ticks[i] == listener.ticks[i - 1] + 1);
+}
+
+TEST_CASE("board_link: a board that cannot change single cameras is greeted anew") {
+    RunningLink running;
+    running.link.reconfigure(two_cameras(20));
+    REQUIRE(running.listener.wait(&LinkListener::Counts::connected, 2));
+    running.link.reconfigure(two_cameras(30));
+    REQUIRE(running.listener.wait(&LinkListener::Counts::connected, 3));
+    CHECK(running.listener.counts().changed == 0);
 }
 
 TEST_CASE("board_link: a board that falls silent is greeted again on the same link") {

@@ -187,14 +187,16 @@ TEST_CASE("camera_channel: ticks count on the grid, and none is used twice until
         CHECK(bench.reports.exposures[0].tick == 21);
         CHECK(bench.reports.exposures[1].tick == (anew ? 21 : 22));
         CHECK(bench.reports.exposures[1].trigger == 2);
-        // A new configuration begins a grid, too. The triggers are counted on.
+        // At another rate they count anew, too. The triggers are counted on.
         bench.channel.stop();
         bench.reports.exposures.clear();
         bench.clock.begin(1'250 * ms, 0);
-        if (anew)
+        if (anew) {
             bench.channel.grid_began();
-        else
+        } else {
+            bench.camera.rate_uhz = 40'000'000;
             bench.configure();
+        }
         bench.start(1'200 * ms);
         bench.run(1'300 * ms);
         bench.channel.give_up();

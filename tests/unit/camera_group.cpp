@@ -16,6 +16,7 @@ class NoBoard final : public BoardListener {
     void board_restarted() override {}
     void board_synchronised() override {}
     void board_connected() override {}
+    void cameras_changed(std::uint8_t /*outputs*/, std::uint8_t /*other_rate*/) override {}
     void board_lost() override {}
     void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {

@@ -100,7 +100,7 @@ std::string documented(const std::string& name) {
 }  // namespace
 
 TEST_CASE("packet: the test vectors of the document") {
-    CHECK(hex(encoded(HostHello{3, 2, {}}, 0x11223344, 0)) == documented("host-hello"));
+    CHECK(hex(encoded(HostHello{3, 3, {}}, 0x11223344, 0)) == documented("host-hello"));
     CHECK(hex(encoded(example_exposure(), 0xA1B2C3D4, 5)) == documented("exposure"));
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
