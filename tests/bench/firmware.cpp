@@ -31,7 +31,7 @@ constexpr double imu_sample_goal = 6'500;
 constexpr double worst_poll_goal = 50'000;
 constexpr double cpu_goal_percent = 8;
 constexpr double stack_goal = 1'536;
-constexpr double image_goal_kib = 37;
+constexpr double image_goal_kib = 42;
 constexpr double static_goal_kib = 64;
 
 constexpr std::size_t profiled_functions = 20;
