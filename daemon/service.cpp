@@ -55,6 +55,12 @@ Configuration for_board(Configuration configuration, const std::vector<CameraPre
     return configuration;
 }
 
+std::vector<std::string> names_of(const std::vector<TimeOutputConfiguration>& outputs) {
+    std::vector<std::string> names;
+    for (const TimeOutputConfiguration& output : outputs) names.push_back(output.name);
+    return names;
+}
+
 ring::Place place_of(const ring::OwnedDirectory& directory, const Configuration& configuration) {
     return {directory.path(), configuration.memory.sealed};
 }
@@ -82,6 +88,7 @@ Expected<std::unique_ptr<Service>> Service::create(const Configuration& configur
 Service::Service(const Configuration& configuration, ring::OwnedDirectory directory,
                  clock::OutputClock output, StatusPublisher status)
     : configuration_(configuration),
+      time_output_names_(names_of(configuration.time_outputs)),
       directory_(std::move(directory)),
       translator_(std::move(output), configuration.clock.pps, directory_.epochs().first(),
                   configuration.clock.on_second_conflict),
@@ -268,9 +275,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
-    if (event.kind == wire::BoardEventKind::time_pulse &&
-        event.source < configuration_.time_outputs.size())
-        entry->source_name = configuration_.time_outputs[event.source].name;
+    if (event.kind == wire::BoardEventKind::time_pulse && event.source < time_output_names_.size())
+        entry->source_name = time_output_names_[event.source];
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
             if (imu->port() == event.source) {

@@ -44,8 +44,8 @@ class Service final : public Controlled, private BoardListener {
     /// Bounded waits and heartbeats; call it every 50 ms or so.
     void tick();
 
-    /// Takes effect at once: what only cameras need is theirs alone; what the board has stops its
-    /// cameras until it is configured anew.
+    /// Takes effect at once: what only cameras need is theirs alone; what the board has stops the
+    /// cameras that it concerns until it is configured anew.
     void reconfigure(const Configuration& configuration) override;
     void ask(const std::string& camera, CameraWish wish) override;
     ChangeReport changes(const std::string& camera) const override;
@@ -86,7 +86,8 @@ class Service final : public Controlled, private BoardListener {
     void board_event(const wire::Event& event, HostTime received) override;
     void sentence(const wire::Sentence& sentence, HostTime received) override;
 
-    Configuration configuration_;
+    Configuration configuration_;                       ///< of the main thread
+    const std::vector<std::string> time_output_names_;  ///< for the link's
     ring::OwnedDirectory directory_;
     clock::Translator translator_;
     StatusPublisher status_;

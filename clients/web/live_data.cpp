@@ -83,10 +83,15 @@ json facts_of(const Frame& frame, const client::Picture& picture) {
             {"histogram", picture.histogram}};
 }
 
-/// What a plot shows of a clock, of a status document.
-json clock_facts(const json& clock) {
+/// What plots show of a clock, of a status document. The output clock is shown against the host's,
+/// less `base_ns`: all its digits are more than a page can read.
+json clock_facts(const json& clock, std::int64_t base_ns) {
     json facts = json::object();
-    for (const char* key : {"sigma_ns", "bound_ns"}) facts[key] = clock.value(key, json());
+    for (const char* key : {"sigma_ns", "bound_ns", "residual_ns", "skew_ppm", "epoch"})
+        facts[key] = clock.value(key, json());
+    if (const auto output = clock.find("output_minus_host_ns");
+        output != clock.end() && output->is_number_integer())
+        facts["output_ns"] = static_cast<double>(output->get<std::int64_t>() - base_ns);
     return facts;
 }
 
@@ -164,8 +169,13 @@ void LiveData::read_status(HostTime now) {
     status_ = status ? std::optional(std::move(*status)) : std::nullopt;
     forget(clock_, now - clock_kept);
     if (!status_) return;
-    if (const auto clock = status_->find("clock"); clock != status_->end() && clock->is_object())
-        clock_.push_back({now, clock_facts(*clock)});
+    const auto clock = status_->find("clock");
+    if (clock == status_->end() || !clock->is_object()) return;
+    if (clock_.empty()) {
+        const json base = clock->value("output_minus_host_ns", json());
+        clock_base_ns_ = base.is_number_integer() ? base.get<std::int64_t>() : 0;
+    }
+    clock_.push_back({now, clock_facts(*clock, clock_base_ns_)});
 }
 
 void LiveData::advance(HostTime now) {

@@ -98,6 +98,8 @@ class LiveData {
     std::optional<EventStream> event_stream_;
     std::deque<Moment> events_;
     std::deque<Moment> clock_;
+    std::int64_t clock_base_ns_ =
+        0;  ///< of the output clock, less the host's, at the first of them
     std::optional<nlohmann::json> status_;
     std::string silence_;  ///< why there is no status
 };

@@ -3,6 +3,8 @@
 
 #include <fmt/ranges.h>
 
+#include <cstring>
+
 #include "base/thread_watch.hpp"
 #include "board/camera_change.hpp"
 #include "engine/board/board_words.hpp"
@@ -161,7 +163,8 @@ void BoardLink::run() {
         dropped_bytes_ = 0;
         const auto ended = serve();
         const bool was_running = report().state == BoardState::running;
-        if (ended) static_cast<void>(send(wire::Stop{all_cameras, {}}));
+        // Whatever else is wrong, cameras are not to be triggered without a service.
+        if (ended || stop_ || explained()) static_cast<void>(send(wire::Stop{all_cameras, {}}));
         reader_.reset();
         stream_.reset();
         if (!ended && !explained()) set_state(BoardState::absent, ended.error().message());
@@ -262,8 +265,13 @@ Expected<> BoardLink::configure() {
     refusals_.clear();
     ++configuration_.id;
     if (auto sent = send(configuration_); !sent) return sent;
-    if (auto done = read_until([this] { return answered_; }, answer_timeout,
-                               "does not answer the configuration");
+    const bool others_run = (configuration_.flags & wire::configuration_cameras) != 0;
+    const auto answered = [&] {
+        // What fails here fails when it is read, too.
+        if (others_run) static_cast<void>(send_commands());
+        return answered_;
+    };
+    if (auto done = read_until(answered, answer_timeout, "does not answer the configuration");
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
@@ -286,6 +294,10 @@ Expected<> BoardLink::change() {
     adopt_configuration();
     const bool able = (greeting_.hello.capabilities & wire::capability_camera_change) != 0;
     const CameraChange change = able ? camera_change(before, configuration_) : CameraChange{};
+    if (std::memcmp(&before, &configuration_, sizeof before) == 0) {  // it was taken back
+        listener_.cameras_changed(accept_starts(), 0);
+        return {};
+    }
     if (change.outputs == 0) {
         anew_ = true;
         return failure("board", "its configuration changes");

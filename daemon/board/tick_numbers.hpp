@@ -26,6 +26,7 @@ class TickNumbers {
     /// The cameras of the mask have another rate on the same grid from now on.
     void rate_changed(std::uint8_t cameras, HostTime now) {
         if (!began_) return;
+        newest_ += apart;
         const std::uint64_t first = begin(now);
         for (unsigned i = 0; i < firsts_.size(); ++i)
             if ((cameras >> i & 1U) != 0) firsts_[i] = first;
@@ -53,6 +54,9 @@ class TickNumbers {
 
     /// No grid follows another clock further than that.
     static constexpr double fastest_pace = 1.01;
+
+    /// Numbers of cameras at different rates meet never: a set is of those that exposed together.
+    static constexpr std::uint64_t apart = std::uint64_t{1} << 32U;
 
     std::array<std::uint64_t, wire::camera_count> firsts_{};
     std::uint64_t newest_ = 0;  ///< the highest of them

@@ -240,13 +240,15 @@ wire::BoardHello Board::introduction() const {
 void Board::configure(const wire::Configuration& configuration) {
     refused_ = 0;
     const bool some = (configuration.flags & wire::configuration_cameras) != 0;
-    const std::uint8_t cameras = some ? changeable(configuration) : std::uint8_t{0};
-    if (some ? cameras == 0 : any_running())
+    if (!some && any_running())
         return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
     checked_id_ = configuration.id;
     check(configuration, hal_.facts, *this);
     if (refused_ != 0)
         return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
+    const std::uint8_t cameras = some ? changeable(configuration) : std::uint8_t{0};
+    if (some && cameras == 0)
+        return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
     wanted_ = configuration;
     on_sync_.cameras = static_cast<std::uint8_t>(some ? on_sync_.cameras & ~cameras : 0);
     // Pulses already decided, and their exposures, end first: none is cut short, and each gets its
@@ -416,19 +418,24 @@ bool Board::idle(std::uint8_t cameras) const {
     return true;
 }
 
-/// A stuck exposure line is not waited for.
-bool Board::may_change(Nanoseconds now) const {
-    return idle(changing_ != 0 ? changing_ : all_cameras) || now >= configure_at_;
+/// Cameras that a configuration which waits is to change.
+std::uint8_t Board::unready() const {
+    if (!configuring_) return 0;
+    return changing_ != 0 ? changing_ : all_cameras;
 }
 
+/// A stuck exposure line is not waited for.
+bool Board::may_change(Nanoseconds now) const { return idle(unready()) || now >= configure_at_; }
+
 void Board::start(const wire::Start& start) {
-    if (configuring_) return;  // it belongs to a configuration that has not been answered yet
+    // What a configuration that has not been answered yet changes cannot start.
+    const auto cameras = static_cast<std::uint8_t>(start.cameras & ~unready());
     if ((start.flags & wire::start_on_sync) != 0 && !any_running()) {
-        on_sync_.cameras |= start.cameras;
+        on_sync_.cameras |= cameras;
         on_sync_.flags = start.flags;
     } else {
-        on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~start.cameras);
-        start_cameras(start.cameras, start.flags);
+        on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~cameras);
+        start_cameras(cameras, start.flags);
     }
 }
 

@@ -75,6 +75,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void configure_camera(unsigned camera);
     void change_cameras();
     std::uint8_t changeable(const wire::Configuration& configuration) const;
+    std::uint8_t unready() const;
     bool may_change(Nanoseconds now) const;
     void apply_imus(const wire::Configuration& configuration, Nanoseconds now);
     Routing::Switched apply_routes(bool force);

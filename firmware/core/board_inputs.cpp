@@ -156,7 +156,7 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     event(wire::BoardEventKind::sync_pulse, 0, at, number, 0);
     const Nanoseconds since = at - last_sync_;
     last_sync_ = at;
-    if (on_sync_.cameras == 0 || configuring_) return follow_sync(at);
+    if ((on_sync_.cameras & ~unready()) == 0) return follow_sync(at);
     if (!any_running()) {
         // Two edges a period apart are pulses; a single one may be anything.
         const std::uint32_t rate = configuration_.ports.sync_rate_uhz;

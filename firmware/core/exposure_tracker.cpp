@@ -14,7 +14,6 @@ void ExposureTracker::configure(const wire::CameraConfiguration& configuration,
     configuration_ = configuration;
     patience_ = patience;
     period_ = configuration.rate_uhz == 0 ? never : 1'000'000'000'000'000 / configuration.rate_uhz;
-    last_end_ = -never;
 }
 
 void ExposureTracker::add(const wire::Exposure& record, Nanoseconds expected) {

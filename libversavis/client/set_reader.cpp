@@ -62,6 +62,7 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::map<Key, Pending> pending;
     std::vector<std::optional<Key>> newest;  ///< of each camera
     std::optional<Key> finished;             ///< of the set before
+    std::optional<EpochTime> finished_at;    ///< latest stamp of it
     std::optional<EpochTime> last;           ///< latest stamp of the set before
     std::optional<std::uint64_t> life;       ///< none: no camera is there yet
     std::vector<bool> ended;  ///< of each camera: its stream is gone, or was never there
@@ -76,6 +77,8 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::optional<NoItem> gone(const NoItem& why, std::size_t camera);
     bool any_ended() const;
     void add(std::size_t camera, Frame frame);
+    bool is_late(const Key& key, const EpochTime& time) const;
+    std::vector<EpochTime> end(const Key& key, const Pending& set);
     bool decided(const Key& key, const Pending& set) const;
     bool deliverable(const Pending& set) const;
     bool covered(const Pending& set) const;
@@ -98,6 +101,7 @@ void SetReader::State::begin(std::uint64_t life_now) {
     pending.clear();
     newest.assign(cameras.size(), std::nullopt);
     finished.reset();
+    finished_at.reset();
     last.reset();
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
         ended[camera] = !cameras[camera];
@@ -178,7 +182,7 @@ void SetReader::State::add(std::size_t camera, Frame frame) {
         return;
     }
     const Key key{frame.data.epoch, frame.data.tick()};
-    if (finished && key <= *finished) {  // its set was given up
+    if (is_late(key, frame.time)) {
         ++report.left_out;
         return;
     }
@@ -189,6 +193,24 @@ void SetReader::State::add(std::size_t camera, Frame frame) {
         set.give_up = deadline_after(options.patience);
     }
     set.frames[camera] = std::move(frame);
+}
+
+/// Its set was given up. A camera of another rate counts its ticks apart from the others: a frame
+/// that is newer than the set before is not late, whatever its tick.
+bool SetReader::State::is_late(const Key& key, const EpochTime& time) const {
+    if (!finished || key > *finished) return false;
+    return key == *finished || !finished_at->precedes(time);
+}
+
+/// No frame is added to this set any more. Returns its stamps.
+std::vector<EpochTime> SetReader::State::end(const Key& key, const Pending& set) {
+    std::vector<EpochTime> times;
+    for (const auto& frame : set.frames)
+        if (frame) times.push_back(frame->time);
+    finished = key;
+    finished_at = *std::max_element(times.begin(), times.end(),
+                                    [](const auto& a, const auto& b) { return a.precedes(b); });
+    return times;
 }
 
 /// True when nothing more can come: each camera is there, went past it, or ended; or time is over.
@@ -212,19 +234,16 @@ bool SetReader::State::covered(const Pending& set) const {
 }
 
 FrameSet SetReader::State::finish(const Key& key, Pending set) {
+    const std::vector<EpochTime> times = end(key, set);
     FrameSet made;
     made.tick = key.second;
     made.frames = std::move(set.frames);
-    std::vector<EpochTime> times;
-    for (const auto& frame : made.frames)
-        if (frame) times.push_back(frame->time);
-    const auto [earliest, latest] = std::minmax_element(
+    const auto earliest = std::min_element(
         times.begin(), times.end(), [](const auto& a, const auto& b) { return a.precedes(b); });
     made.time = times.front();
-    made.spread = latest->since(*earliest).value_or(Duration{});
-    finished = key;
-    if (imu) made.imu = samples_until(*latest);
-    last = *latest;
+    made.spread = finished_at->since(*earliest).value_or(Duration{});
+    if (imu) made.imu = samples_until(*finished_at);
+    last = *finished_at;
     ++report.sets;
     return made;
 }
@@ -245,7 +264,7 @@ std::optional<FrameSet> SetReader::State::ready() {
         if (!decided(first->first, set)) return std::nullopt;
         if (!deliverable(set)) {
             ++report.incomplete;
-            finished = first->first;
+            end(first->first, set);
             pending.erase(first);
             continue;
         }
@@ -266,7 +285,7 @@ void SetReader::State::skip_older() {
     while (newest_set != pending.rend() && pending.begin()->first < newest_set->first) {
         const auto first = pending.begin();
         ++(deliverable(first->second) ? report.skipped : report.incomplete);
-        finished = first->first;
+        end(first->first, first->second);
         pending.erase(first);
     }
 }

@@ -137,10 +137,11 @@ inline std::uint8_t changed_cameras(const Configuration& in_force, const Configu
     for (unsigned i = 0; i < camera_count; ++i) {
         const CameraConfiguration& old = in_force.cameras[i];
         const CameraConfiguration& camera = wanted.cameras[i];
-        const bool follows = (old.flags & camera_slave) != 0;
+        const bool enabled = (old.flags & camera_enabled) != 0;
+        const bool follows = enabled && (old.flags & camera_slave) != 0;
         if (follows) masters = static_cast<std::uint8_t>(masters | 1U << old.master);
         if (std::memcmp(&old, &camera, sizeof camera) == 0) continue;
-        if (follows || (old.flags & camera_enabled) == 0 || old.flags != camera.flags) return 0;
+        if (follows || !enabled || old.flags != camera.flags) return 0;
         changed = static_cast<std::uint8_t>(changed | 1U << i);
     }
     static_assert(offsetof(Configuration, ports) + sizeof(PortConfiguration) ==

@@ -398,9 +398,43 @@ TEST_CASE("board: a change of a camera waits for its exposure that is under way"
     bench.send(bench.configuration);
     bench.run_for(30 * ms);
     CHECK(bench.all<wire::ConfigurationAnswer>().size() == 1);
+    // The other cameras may be stopped and started meanwhile, this one not.
+    bench.send(wire::Stop{1, {}});
+    bench.send(wire::Start{3, 0, {}});
     bench.edge(1, bench.port.time, false);
     bench.run_for(ms);
     CHECK(bench.all<wire::ConfigurationAnswer>().size() == 2);
+    // What was recorded before comes before the answer.
+    std::vector<wire::Type> order;
+    wire::Decoder decoder;
+    decoder.feed(bench.port.sent.data(), bench.port.sent.size(),
+                 [&](const wire::Packet& packet) { order.push_back(packet.header.type); });
+    const auto last = [&](wire::Type type) {
+        return std::find(order.rbegin(), order.rend(), type) - order.rbegin();
+    };
+    CHECK(bench.all<wire::Exposure>().back().camera == 1);
+    CHECK(last(wire::Type::exposure) > last(wire::Type::configuration_answer));
+    bench.pulsed();
+    bench.run_for(100 * ms);
+    CHECK(bench.pulsed() == (1U | 1U << output_sync));
+}
+
+TEST_CASE("board: a camera that changes keeps its pause after the exposure before") {
+    ChangingCamera bench(0);
+    bench.configuration.cameras[1].gap_ns = 40'000'000;
+    bench.configuration.cameras[1].exposure_ns = ms;
+    bench.edge(1, bench.port.time + 9 * ms, false);
+    bench.run_for(10 * ms);
+    CHECK(bench.all<wire::ConfigurationAnswer>().size() == 1);
+    bench.send(bench.configuration);
+    bench.run_for(ms);
+    CHECK(bench.all<wire::ConfigurationAnswer>().size() == 2);
+    bench.pulsed();
+    bench.send(wire::Start{2, 0, {}});
+    const Nanoseconds ended = 1'019 * ms;
+    bench.run(1'200 * ms);
+    REQUIRE_FALSE(bench.pulses(1).empty());
+    CHECK(bench.pulses(1).front() >= ended + 40 * ms);
 }
 
 TEST_CASE("board: what is not a change of stopped cameras alone needs all to stop") {
@@ -444,6 +478,8 @@ TEST_CASE("board: what is not a change of stopped cameras alone needs all to sto
 TEST_CASE("board: a change of a camera out of range is refused") {
     ChangingCamera bench;
     bench.configuration.cameras[1].rate_uhz = 1;
+    CHECK(bench.change().status == wire::ConfigurationStatus::refused);
+    bench.configuration.imus[0] = {wire::ImuKind::adis16448b, 0, wire::imu_data_ready, 0, 0};
     CHECK(bench.change().status == wire::ConfigurationStatus::refused);
 }
 

@@ -454,12 +454,15 @@ TEST_CASE("board_link: settings of one camera change while another is triggered"
     CHECK(listener.changes == std::pair<std::uint8_t, std::uint8_t>(0b10, 0b10));
     const unsigned before = listener.counts().exposures;
     REQUIRE(listener.wait(&LinkListener::Counts::exposures, before + 20));
+    link.reconfigure(two_cameras(20));  // which is in force
+    REQUIRE(listener.wait(&LinkListener::Counts::changed, 2));
+    CHECK(listener.changes == std::pair<std::uint8_t, std::uint8_t>(0, 0));
     // Back to the rate, and so to the ticks, of the other one.
     link.reconfigure(two_cameras(50));
     REQUIRE(listener.wait(&LinkListener::Counts::connected, 2));
     CHECK(listener.counts().lost == 1);
     link.stop();
-    CHECK(listener.counts().changed == 1);
+    CHECK(listener.counts().changed == 2);
     CHECK(listener.counts().restarted == 1);
     REQUIRE(listener.ticks.size() > 20);
     for (std::size_t i = 1; i < listener.ticks.size(); ++i)

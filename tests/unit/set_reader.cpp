@@ -114,6 +114,31 @@ TEST_CASE_METHOD(Rig, "set_reader: ticks of more than 32 bits do not meet by the
     CHECK(sets.report().incomplete == 1);
 }
 
+TEST_CASE_METHOD(Rig, "set_reader: a camera that counts far beyond the others holds no set back") {
+    SetOptions partial = options();
+    partial.partial = true;
+    partial.patience = {};
+    auto other_rate = camera("c");
+    auto opened = SetReader::open({"a", "b", "c"}, partial);
+    REQUIRE(opened);
+    SetReader& sets = *opened;
+    constexpr std::uint64_t far = 1'000'000'000'000;
+    for (const std::uint64_t tick : {3, 5, 7}) {
+        frame(*other_rate, far + tick);
+        auto set = sets.next({});
+        REQUIRE(set);
+        CHECK(set->tick == far + tick);
+        for (auto& writer : {&a, &b}) frame(**writer, tick + 1);
+        set = sets.next({});
+        REQUIRE(set);
+        CHECK(set->tick == tick + 1);
+        CHECK((set->frames[0] && set->frames[1] && !set->frames[2]));
+        frame(*a, tick - 1);  // too late for its set
+        CHECK(sets.next({}).error().why == Pause::nothing);
+    }
+    CHECK(sets.report().left_out == 3);
+}
+
 TEST_CASE_METHOD(Rig, "set_reader: a set is given up as soon as a camera went past it") {
     SetOptions partial = options();
     partial.partial = GENERATE(true, false);

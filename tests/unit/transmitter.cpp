@@ -120,9 +120,9 @@ TEST_CASE(
         fill<wire::Sentence>(transmitter, 40, 32, expected);
         fill<wire::ImuSample>(transmitter, 258, 256, expected);
         fill<wire::Health>(transmitter, 4, 1, expected);
+        fill<wire::ConfigurationAnswer>(transmitter, 7, 1, expected);
         fill<wire::Event>(transmitter, 132, 128, expected);
         fill<wire::Exposure>(transmitter, 261, 256, expected);
-        fill<wire::ConfigurationAnswer>(transmitter, 7, 1, expected);
         fill<wire::Refusal>(transmitter, 55, 48, expected);
         fill<wire::ClockAnswer>(transmitter, 16, 8, expected);
         fill<wire::ClockFollowUp>(transmitter, 10, 1, expected);

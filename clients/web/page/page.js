@@ -76,8 +76,9 @@ function begin_drawing(canvas) {
     return {pen, width, height};
 }
 
-/** Lines over time. `series`: {name, points: [[seconds, value]]}; time ends now, at 0. */
-function draw_lines(canvas, series, seconds, unit, from_zero) {
+/** Lines over time. `series`: {name, points: [[seconds, value]]}; time ends now, at 0. `marks`:
+ *  instants with words, [[seconds, text]]. */
+function draw_lines(canvas, series, seconds, unit, from_zero, marks = []) {
     const {pen, width, height} = begin_drawing(canvas);
     const left = 56, bottom = 18, top = 16;
     const values = series.flatMap((line) => line.points.map((point) => point[1]))
@@ -102,6 +103,15 @@ function draw_lines(canvas, series, seconds, unit, from_zero) {
     pen.fillText(unit, 0, (height - bottom) / 2 + 4);
     pen.strokeStyle = colour("--line");
     pen.strokeRect(left, top, width - left - 4, height - bottom - top);
+    marks.filter(([t]) => t > -seconds).forEach(([t, text], i) => {
+        pen.setLineDash([1, 3]);
+        pen.beginPath();
+        pen.moveTo(x(t), top);
+        pen.lineTo(x(t), height - bottom);
+        pen.stroke();
+        const place = Math.min(x(t) + 4, width - 4 - pen.measureText(text).width);
+        pen.fillText(text, Math.max(left + 2, place), top + 12 + 12 * (i % 4));
+    });
     let at = left + 6;
     series.forEach((line, i) => {
         pen.strokeStyle = pen.fillStyle = colour(`--plot${i % 3}`);
@@ -400,12 +410,62 @@ function update_imus(state) {
     }
 }
 
+/** Where epochs begin, and how far the output clock stepped there. */
+function epoch_marks(moments) {
+    const marks = [];
+    for (let i = 1; i < moments.length; ++i) {
+        if (moments[i].epoch === moments[i - 1].epoch) continue;
+        const by_ns = moments[i].output_ns - moments[i - 1].output_ns;
+        const stepped = Math.abs(by_ns) > 1e5;
+        const step = stepped ? `: output ${by_ns < 0 ? "−" : "+"}${length_of(Math.abs(by_ns))}` : "";
+        marks.push([-moments[i].age_s, `epoch ${moments[i].epoch}${step}`]);
+    }
+    return marks;
+}
+
+/** How the output clock ran against the host's, from the beginning of each epoch on. */
+function output_points(moments) {
+    let begin = null;
+    return moments.map((moment, i) => {
+        if (i === 0 || moment.epoch !== moments[i - 1].epoch) begin = moment.output_ns;
+        const known = moment.output_ns !== undefined && begin !== undefined;
+        return [-moment.age_s, known ? (moment.output_ns - begin) / 1e3 : null];
+    });
+}
+
+const clock_plots = [
+    {name: "sigma and bound", unit: "µs", from_zero: true,
+        series: {sigma: ["sigma_ns", 1e-3], bound: ["bound_ns", 1e-3]}},
+    {name: "offset: newest exchange minus estimate", unit: "µs",
+        series: {offset: ["residual_ns", 1e-3]}},
+    {name: "skew: host against board", unit: "ppm", series: {skew: ["skew_ppm", 1]}},
+    {name: "output clock minus host clock, in this epoch", unit: "µs", output: true},
+];
+
+function clock_canvases() {
+    const box = by_id("clock");
+    if (box.children.length === 0)
+        for (const plot of clock_plots) {
+            const canvas = element("canvas");
+            canvas.setAttribute("role", "img");
+            canvas.setAttribute("aria-label", `Clock, ${plot.name}`);
+            box.append(canvas);
+        }
+    return box.children;
+}
+
 function update_clock(state) {
-    const points = (key) => state.clock.map((moment) =>
-        [-moment.age_s, moment[key] === null ? null : moment[key] / 1e3]);
-    const oldest = state.clock.length > 0 ? state.clock[0].age_s : 0;
-    draw_lines(by_id("clock"), [{name: "sigma", points: points("sigma_ns")},
-        {name: "bound", points: points("bound_ns")}], Math.max(10, oldest), "µs", true);
+    const points = ([key, factor]) => state.clock.map((moment) =>
+        [-moment.age_s, typeof moment[key] === "number" ? moment[key] * factor : null]);
+    const seconds = Math.max(10, state.clock.length > 0 ? state.clock[0].age_s : 0);
+    const marks = epoch_marks(state.clock);
+    const canvases = clock_canvases();
+    clock_plots.forEach((plot, i) => {
+        const series = plot.output ? [{name: plot.name, points: output_points(state.clock)}] :
+            Object.entries(plot.series).map(([name, of]) => ({name, points: points(of)}));
+        if (series.length === 1) series[0].name = plot.name;
+        draw_lines(canvases[i], series, seconds, plot.unit, plot.from_zero, marks);
+    });
     const clock = state.status?.clock;
     set_text(by_id("clock-text"), clock ? `${clock.state}, output ${clock.output}, skew ` +
         `${(clock.skew_ppm ?? 0).toFixed(3)} ppm, round trip ${length_of(clock.round_trip_ns)}, ` +
