@@ -104,6 +104,7 @@ function draw_lines(canvas, series, seconds, unit, from_zero, marks = []) {
     pen.strokeStyle = colour("--line");
     pen.strokeRect(left, top, width - left - 4, height - bottom - top);
     marks.filter(([t]) => t > -seconds).forEach(([t, text], i) => {
+        pen.strokeStyle = colour("--faint");
         pen.setLineDash([1, 3]);
         pen.beginPath();
         pen.moveTo(x(t), top);
