@@ -209,10 +209,11 @@ TEST_CASE("cameras: two frames of every trigger are never published, and said fr
                    " triggers: none of the surplus") != std::string::npos;
     };
     stack.wait_for_status(said);
-    // Patterns and slow starts alternate: neither makes it another fault.
+    // Patterns and slow starts alternate: neither makes it another fault. A host that is busy
+    // meanwhile is one.
     stack.wait_for_status([&](const auto& s) {
         INFO(s["cameras"][0].dump(1));
-        CHECK(said(s));
+        CHECK((said(s) || s["cameras"][0]["fault"] == "late_records"));
         // Which of the two is the first, nobody can know.
         CHECK(s["cameras"][0]["frames_published"] == 0);
         return s["cameras"][0]["frames_received"] > 200;
@@ -362,13 +363,20 @@ TEST_CASE("cameras: without an exposure line, its events show how long it expose
         INFO(camera);
         auto stream = FrameStream::open(camera, {{}, stack.instance()});
         REQUIRE(stream);
-        const auto frame = stream->next(seconds(10));
-        REQUIRE(frame);
-        CHECK(frame->data.stamp_kind() == StampKind::trigger_edge);
-        CHECK(((frame->data.flags & flag_camera_length) != 0) == by_events);
-        const Duration exposure = by_events ? milliseconds(8) : Duration{};
-        CHECK(absolute(frame->data.exposure - exposure) < microseconds(2));
-        CHECK((frame->data.sigma_ns < 1'000'000) == by_events);
+        unsigned lengths = 0;
+        for (int i = 0; i < 20; ++i) {
+            const auto frame = stream->next(seconds(10));
+            if (!frame && frame.error().why == Pause::lost) continue;
+            REQUIRE(frame);
+            CHECK(frame->data.stamp_kind() == StampKind::trigger_edge);
+            // On a busy host an event may come too late for its frame.
+            const bool has_length = (frame->data.flags & flag_camera_length) != 0;
+            const Duration exposure = has_length ? milliseconds(8) : Duration{};
+            CHECK(absolute(frame->data.exposure - exposure) < microseconds(2));
+            CHECK((frame->data.sigma_ns < 1'000'000) == has_length);
+            lengths += has_length ? 1U : 0U;
+        }
+        CHECK((lengths > 0) == by_events);
     }
     judge(stack, 2);
 }
