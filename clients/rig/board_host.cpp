@@ -247,13 +247,14 @@ void BoardHost::run() {
 void BoardHost::live() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
-        if (utc_) hear_gnss();
+        const HostTime now = host_now();
+        if (utc_) hear_gnss(now);
         hear_auxiliaries();
-        const HostTime next_sample = signal_samples();
+        const HostTime next_sample = signal_samples(now);
         board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
-        const firmware::Nanoseconds now = board_now();
-        board_->run_until(now);
-        if (leds_ != nullptr) leds_->settle(clock_->host(now));
+        // No further, however late it is by now: later edges are not scheduled yet.
+        board_->run_until(clock_->device_ns(now));
+        if (leds_ != nullptr) leds_->settle(now);
         plug(!suffers(FaultKind::board_gone));
         if (!suffers(FaultKind::board_mute)) exchange_bytes();
         const HostTime wake =
@@ -283,10 +284,9 @@ void BoardHost::hear_auxiliaries() {
 }
 
 /// The pulse at each second, and its sentences.
-void BoardHost::hear_gnss() {
+void BoardHost::hear_gnss(HostTime now) {
     constexpr std::int64_t second_ns = 1'000'000'000;
     const Duration offset = utc_->offset();
-    const HostTime now = host_now();
     if (next_utc_s_ == 0) next_utc_s_ = (now + offset + marked_ahead).ns / second_ns + 1;
     const HostTime pulse = HostTime{next_utc_s_ * second_ns} - offset;
     if (pulse - now > marked_ahead) return;
@@ -301,8 +301,7 @@ void BoardHost::hear_gnss() {
 }
 
 /// Edges of the data-ready line, where the part is set to use it. Returns when to come again.
-HostTime BoardHost::signal_samples() {
-    const HostTime now = host_now();
+HostTime BoardHost::signal_samples(HostTime now) {
     if (!imu_.signals(now.ns) || suffers(FaultKind::imu_missing)) {
         signalled_ = now;
         return now + longest_wait;

@@ -52,9 +52,9 @@ class BoardHost {
     void restart();
     void wait(HostTime until) const;
     void exchange_bytes();
-    void hear_gnss();
+    void hear_gnss(HostTime now);
     void hear_auxiliaries();
-    HostTime signal_samples();
+    HostTime signal_samples(HostTime now);
     void accept_host();
     void drop_host();
     void reset() { reset_pending_ = true; }

@@ -125,8 +125,11 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     translator_.heard(departures_, {departed, received}, fits);
     translator_.heard(samples_, {pulse.at, received}, fits);
     const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, impossible);
+    const bool time_doubted = doubt && doubt->reason == EventReason::implausible_time;
+    const Duration apart{time_doubted ? doubt->said - doubt->expected : 0};
     const Promptness promptness =
-        arrival ? delays_.of(arrival->delay, arrival->sigma) : Promptness::unknown;
+        arrival ? delays_.of(arrival->delay, arrival->sigma, tolerance_between(apart))
+                : Promptness::unknown;
     if (doubt) {
         step_promptness_.doubted(promptness);
         if (!arrival || impossible || contact.contradicted ||

@@ -32,6 +32,14 @@ TEST_CASE("delay_floor: few messages, or a bad clock, decide nothing") {
     CHECK(bench.of(seconds(5)) == Promptness::late);
     CHECK(bench.of(microseconds(300), microseconds(40)) == Promptness::unknown);
     CHECK(bench.of(microseconds(79), microseconds(40)) == Promptness::early);
+    // It tells apart what is far apart.
+    const auto of = [&](Duration delay, Duration apart) {
+        return bench.floor.of(delay, microseconds(40), tolerance_between(apart));
+    };
+    CHECK(of(microseconds(300), microseconds(479)) == Promptness::unknown);
+    CHECK(of(microseconds(300), -milliseconds(5)) == Promptness::usual);
+    CHECK(of(microseconds(1671), milliseconds(5)) == Promptness::late);
+    CHECK(of(-microseconds(1071), milliseconds(5)) == Promptness::early);
     bench.floor.forget();
     CHECK(bench.of(seconds(5)) == Promptness::unknown);
 }

@@ -193,6 +193,29 @@ TEST_CASE("imu_pipeline: samples that agree in a new phase are taken if they als
           microseconds(5));
 }
 
+TEST_CASE("imu_pipeline: a clock that is known to 50 us tells a period from a new phase") {
+    ImuBench bench{false};
+    std::mt19937 random{1};
+    std::exponential_distribution<double> wait{1e-6};  // 1 ms in the mean
+    const auto delay = [&] {
+        return microseconds(300) + Duration{static_cast<std::int64_t>(wait(random))};
+    };
+    constexpr std::uint32_t slip = 200;
+    std::uint32_t withheld = 0;
+    for (std::uint32_t i = 0; i < slip + 200; ++i) {
+        const HostTime host = bench.instant(i);
+        const BoardTime board = test::Pipelines::to_board(host);
+        if (i % 20 == 0) bench.translator.add({host - delay(), board, board, host + delay()});
+        const std::uint32_t number = i < slip ? i : i - 3;
+        bench.pipeline.add(sample(number, board), host + delay());
+        if (bench.published().empty() && i >= slip) ++withheld;
+    }
+    const auto estimate = bench.translator.to_host(test::Pipelines::to_board(bench.instant(400)));
+    REQUIRE(estimate);
+    CHECK(estimate->spread > usual_delay_tolerance / 3);
+    CHECK(withheld < 100);  // five exchanges
+}
+
 TEST_CASE("imu_pipeline: on a busy host, a clock that steps does not pass for a new phase") {
     ImuBench bench;
     std::mt19937 random{1};

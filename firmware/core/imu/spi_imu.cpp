@@ -201,8 +201,9 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
         return drop(wire::BoardEventKind::imu_failed, now);
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
-    if (edges_lost_) {
-        // How many there were follows from the part's period.
+    const bool after_another = served_at_ != began_;
+    if (edges_lost_ || (after_another && due == 1)) {
+        // How many there were follows from the part's period: some may not have come.
         const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
         due = periods > due ? periods : due;

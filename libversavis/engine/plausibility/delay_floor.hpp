@@ -24,6 +24,12 @@ enum class Promptness : std::uint8_t {
 /// which there is as much at most.
 constexpr Duration usual_delay_tolerance = microseconds(100);
 
+/// Two accounts of an instant are `apart`: how far a usual delay may then be off the shortest. The
+/// further they are apart, the less precise a clock tells them apart.
+inline Duration tolerance_between(Duration apart) {
+    return std::max(usual_delay_tolerance, absolute(apart) / 4);
+}
+
 /// Two accounts of an instant are `apart`: the delay of the message shows that its own is right.
 inline bool arrival_confirms(Promptness promptness, Duration apart) {
     return promptness == Promptness::usual && absolute(apart) > usual_delay_tolerance * 4;
@@ -53,12 +59,13 @@ class StepPromptness {
 class DelayFloor {
  public:
     /// `sigma`: of the clock that `delay` is measured with.
-    Promptness of(Duration delay, Duration sigma) const {
+    Promptness of(Duration delay, Duration sigma,
+                  Duration tolerance = usual_delay_tolerance) const {
         if (count_ < messages_to_know) return Promptness::unknown;
-        const Duration allowed = usual_delay_tolerance + sigma * sigmas;
+        const Duration allowed = tolerance + sigma * sigmas;
         if (delay < least_ - allowed) return Promptness::early;
         if (delay > least_ + allowed) return Promptness::late;
-        return sigma * sigmas > usual_delay_tolerance ? Promptness::unknown : Promptness::usual;
+        return sigma * sigmas > tolerance ? Promptness::unknown : Promptness::usual;
     }
 
     /// Of a message that is believed.
