@@ -25,14 +25,18 @@ def ends(first: str, last: str, turn: int) -> tuple[Mark, ...]:
     return (first, -1.95, 0.0, turn), (last, 7.03, 0.0, turn)
 
 
-def firmware_pins() -> dict[str, int]:
-    """GPIO by signal, of the firmware itself."""
+def firmware_names() -> dict[str, int]:
+    """GPIO by name as the firmware has them: of cameras the first; some names share a pin."""
     text = (ROOT / "firmware/rp2040/pins.hpp").read_text()
     body = re.search(r"enum Pin : unsigned \{(.*?)\};", text, re.S)
     assert body
-    found = {name: int(number) for name, number in re.findall(r"pin_(\w+) = (\d+)", body.group(1))}
+    return {name: int(number) for name, number in re.findall(r"pin_(\w+) = (\d+)", body.group(1))}
+
+
+def firmware_pins() -> dict[str, int]:
+    """GPIO by signal, of the firmware itself."""
     pins: dict[str, int] = {}
-    for name, gpio in found.items():
+    for name, gpio in firmware_names().items():
         if name == "count" or name in SHARED:
             continue
         count = CAMERAS if name in ("exposure0", "trigger0") else 1
@@ -124,9 +128,10 @@ def camera(board: Board, n: int) -> None:
     direct = tuple(v for v in board.variants if v != "isolated" or n not in ISOLATED)
     board.add(f"J{b}", gh(4), g, label=f"CAM{n}", _1="GND", _2=trigger, _3=exposure, _4="GND",
               MP="GND")
-    board.add(f"JP{b}", c.LEVEL, g, marks=LEVEL_MARKS, _1="+1V8", _2=level, _3="+3V3", _4="+5V")
-    board.add(f"JP{b + 1}", jumper(3), g, marks=ends("UP", "DN", 0), _1=f"CAM{n}_UP", _2=exposure,
-              _3=f"CAM{n}_DOWN")
+    board.add(f"JP{b}", c.LEVEL, g, marks=LEVEL_MARKS, delivered="3.3", _1="+1V8", _2=level,
+              _3="+3V3", _4="+5V")
+    board.add(f"JP{b + 1}", jumper(3), g, marks=ends("UP", "DN", 0), delivered="UP",
+              _1=f"CAM{n}_UP", _2=exposure, _3=f"CAM{n}_DOWN")
     board.add(f"D{b}", c.ESD24, g, near=f"J{b}.2", IO1=trigger, IO2=exposure, GND="GND")
     # Trigger: Pico, rest, driver, series resistor, connector.
     board.add(f"U{b}", c.T45, g, near=f"J{b}.2", VCCA="+3V3", GND="GND", A=f"TRIGGER{n}",
@@ -217,7 +222,9 @@ def lidar(board: Board, n: int) -> None:
     level, pps, serial = f"LIDAR{n}_LEVEL", f"LIDAR{n}_PPS", f"LIDAR{n}_SERIAL"
     board.add(f"J{b}", gh(4), g, label=f"LIDAR{n}", _1=pps, _2="GND", _3=serial, _4="GND", MP="GND")
     board.add(f"D{b}", c.ESD24, g, near=f"J{b}.2", IO1=pps, IO2=serial, GND="GND")
-    board.add(f"JP{b}", jumper(3), g, marks=ends("3.3", "5V", 90), _1="+3V3", _2=level, _3="+5V")
+    # Delivered at 3.3 V: 5 V destroys the inputs of a Livox.
+    board.add(f"JP{b}", jumper(3), g, marks=ends("3.3", "5V", 90), delivered="3.3", _1="+3V3",
+              _2=level, _3="+5V")
     board.add(f"JP{b + 1}", jumper(2, 2), g, label="INVERT", marks=INVERT_MARKS,
               _1=f"LIDAR{n}_PPS_INVERT", _2="+3V3",
               _3=f"LIDAR{n}_SERIAL_INVERT", _4="+3V3")
@@ -340,10 +347,13 @@ def imus(board: Board) -> None:
     spi = ("SPI_CLOCK", "SPI_TRANSMIT", "SPI_RECEIVE", "SPI_SELECT0", "SPI_SELECT1", "IMU_READY0",
            "ACCEL_READY")
     outside = {name: f"{name}_X" for name in spi}
+    names = firmware_names()
+    data, clock = (next(net for name, net in outside.items()
+                        if pins[name.lower()] == names[shared]) for shared in SHARED)
     board.add("J800", gh(9), g, label="IMU SPI", _1="+3V3", _2="GND", MP="GND",
               named={str(i + 3): outside[name] for i, name in enumerate(spi)})
-    board.add("J801", gh(5), g, label="I2C", _1="+3V3", _2="GND", _3="SPI_TRANSMIT_X",
-              _4="SPI_CLOCK_X", _5="IMU_READY0_X", MP="GND")
+    board.add("J801", gh(5), g, label="I2C", words={"3": "SCL", "4": "SDA"}, _1="+3V3", _2="GND",
+              _3=clock, _4=data, _5="IMU_READY0_X", MP="GND")
     board.add("D800", c.ESD5, g, near="J800.4", IO1=outside[spi[0]], GND="GND", IO2=outside[spi[1]],
               IO3=outside[spi[2]], IO4=outside[spi[3]])
     board.add("D801", c.ESD5, g, near="J800.7", IO1=outside[spi[4]], GND="GND", IO2=outside[spi[5]],
@@ -353,8 +363,8 @@ def imus(board: Board) -> None:
     for i, name in enumerate(spi):
         ohm = "1k" if name.endswith("READY") or name == "IMU_READY0" else "33R"
         board.add(f"R{800 + i}", resistor(ohm), g, near=f"J800.{i + 3}", _1=name, _2=outside[name])
-    board.add("JP800", jumper(2, 2), g, label="I2C PULL", _1="I2C_PULL_DATA", _2="SPI_CLOCK_X",
-              _3="I2C_PULL_CLOCK", _4="SPI_TRANSMIT_X")
+    board.add("JP800", jumper(2, 2), g, label="I2C PULL", _1="I2C_PULL_DATA", _2=data,
+              _3="I2C_PULL_CLOCK", _4=clock)
     board.add("R807", resistor("2k2"), g, near="JP800.1", _1="+3V3", _2="I2C_PULL_DATA")
     board.add("R808", resistor("2k2"), g, near="JP800.3", _1="+3V3", _2="I2C_PULL_CLOCK")
     for ref, name, to in (("R809", "SPI_SELECT0", "+3V3"), ("R810", "SPI_SELECT1", "+3V3"),
@@ -382,9 +392,8 @@ def uart(board: Board) -> None:
     decouple(board, "C821", g, "U821.5", "+3V3")
     board.add("R826", resistor("100R"), g, near="U821.4", _1="UART_DRIVER", _2="UART_OUT")
     board.add("R827", resistor("4k7"), g, near="U821.2", _1="UART_TRANSMIT", _2="+3V3")
-    board.add("JP820", jumper(3), g, label="RX", marks=ends("IMU", "NMEA", 90),
-              _1="UART_CLEAN", _2="UART_SELECTED",
-              _3="NMEA_RECEIVED")
+    board.add("JP820", jumper(3), g, label="RX", marks=ends("IMU", "NMEA", 90), delivered="IMU",
+              _1="UART_CLEAN", _2="UART_SELECTED", _3="NMEA_RECEIVED")
     board.add("R828", resistor("100R"), g, near="JP820.2", _1="UART_SELECTED", _2="UART_RECEIVE")
     board.add("R829", resistor("4k7"), g, near="JP820.2", _1="UART_RECEIVE", _2="+3V3")
 

@@ -112,7 +112,7 @@ EFUSE = Component(
          "16 OUT po, 17 EP pas"),
     "TPS26600PWPR", "Texas Instruments",
     "TI SLVSDG2: 4.2 to 55 V, -60 V reverse, OVP and UVLO at 1.19 V, R(ILIM) = 12 V / I, 150 mOhm",
-    ("TPS26602PWPR",), 1.90, "efuse", (("most_v", 60.0), ("amps", 2.0), ("ohm", 0.25)))
+    (), 1.90, "efuse", (("most_v", 60.0), ("amps", 2.0), ("ohm", 0.25)))
 BUCK = Component(
     "AP63205", "SOT-23-6", pins("1 FB in, 2 EN in, 3 VIN pi, 4 GND pi, 5 SW po, 6 BST pas"),
     "AP63205WU-7", "Diodes", "Diodes AP63205: 3.8 to 32 V, 5.0 V, 2 A, 1.1 MHz",
@@ -221,6 +221,8 @@ def jumper(columns: int, rows: int = 1) -> Component:
 LEVEL = Component("level jumper", "HEADER-LEVEL", pins("1 1 pas, 2 2 pas, 3 3 pas, 4 4 pas"),
                   "pin header 2.54 mm", "any", "pin header 2.54 mm: 1x3 and 1x1",
                   ("any pin header 2.54 mm",), 0.08, "jumper", (), "connector")
+SHUNT = Component("shunt 2.54 mm", "", (), "60900213421", "Würth", "shunt 2.54 mm",
+                  ("any shunt 2.54 mm",), 0.03)
 MICRO_FIT = Component("Micro-Fit 2", "MICRO-FIT-2", TWO, "43650-0200", "Molex",
                       "Molex 43650: 3 mm, locks, 5 A or more", ("436500200",), 0.60, "connector",
                       (("amps", 5.0),), "connector")

@@ -17,6 +17,7 @@ PICO_HIGH, PICO_LOW, PICO_MOST = 2.0, 0.8, 3.6
 PICO_GIVES = (2.62, 0.5)  # at 4 mA
 WEAK_PULL = 8.2e3  # ohm that still hold a pin of a Pico 2 against its leakage
 BACK_FEED_OHM = 1000.0
+DECOUPLED = ("t45", "schmitt", "lvc", "hc", "isolator", "buck", "ldo", "imu", "efuse")
 SIGNAL_SUPPLY = ("VIN", "VPROT", "VCAM", "24V", "+")
 SUPPLY_NAMES = ("power_in",)
 
@@ -402,8 +403,7 @@ def decoupling(board: Board) -> list[str]:
     """Each supply pin of a chip has a capacitor to ground on its net."""
     faults = []
     for part in board.parts.values():
-        if part.component.family not in ("t45", "schmitt", "lvc", "hc", "isolator", "buck", "ldo",
-                                         "imu", "efuse"):
+        if part.component.family not in DECOUPLED:
             continue
         for pin in part.component.pins:
             net = part.nets.get(pin.number, "")

@@ -8,6 +8,9 @@ import timing
 from boards import BOARDS
 from kept import HARDWARE
 
+JUMPERS = {"JP200": "`LVL` of each camera", "JP201": "`UP`/`DN` of each camera",
+           "JP600": "`3.3`/`5V` of each LiDAR", "JP601": "`INVERT`, `P` and `S` of each LiDAR",
+           "JP700": "`50 OHM`", "JP701": "`NMEA INV`", "JP820": "`RX`", "JP800": "`I2C PULL`"}
 CHEAP = 40.0  # USD in tens, without the board and the Pico
 
 
@@ -23,6 +26,11 @@ def cable_rows() -> list[str]:
     return rows
 
 
+def short_rows() -> list[str]:
+    """What is missing in the worst corner, of each output that the table excepts."""
+    return [f"| {volts:g} V | {short:g} V |" for volts, short in cables.exceptions()]
+
+
 def faults(text: str | None = None) -> list[str]:
     text = text or (HARDWARE / "README.md").read_text()
     carrier = BOARDS["carrier"]()
@@ -32,7 +40,9 @@ def faults(text: str | None = None) -> list[str]:
     inputs, outputs = delay["inputs"], delay["outputs"]
     wanted = [f"board_delay_ns = {{ inputs = {inputs}, outputs = {outputs} }}",
               f"{carrier.width:g} x {carrier.height:g} mm", f"{parts} parts",
-              f"{price:.0f} USD", *cable_rows()]
+              f"{price:.0f} USD", *cable_rows(), *short_rows(),
+              *(f"| {name} | {carrier.parts[ref].delivered or 'open'} |"
+                for ref, name in JUMPERS.items())]
     found = [f"README.md does not say '{each}'" for each in wanted if each not in text]
     if price > CHEAP:
         found.append(f"the parts of the carrier are {price:.0f} USD, {CHEAP:g} are allowed")

@@ -7,6 +7,7 @@ import itertools
 import math
 from typing import Iterator
 
+from checks import DECOUPLED
 from footprints import ALL
 from kicad_pcb import heat_areas, heat_vias, label_box, labels, overlaps
 from layout import Layout
@@ -15,7 +16,7 @@ from rules import DRILL, ISOLATION, VIA
 
 CLEAR = 0.15
 DECOUPLING = 3.0  # mm from a supply pin to its capacitor
-ESD_REACH = 12.0  # mm from a connector's pin to its ESD part
+ESD_REACH = 7.0  # mm from a connector's pin to its ESD part
 LONGEST = {"SW": 14.0, "BST": 12.0, "RTN": 45.0, "TRIGGER": 130.0, "EXPOSURE": 130.0,
            "CAM": 75.0, "SPI_": 110.0}
 Point = tuple[float, float]
@@ -60,7 +61,7 @@ def pin_spot(board: Board, part: Part, number: str) -> Point:
 def near_capacitor(board: Board) -> list[str]:
     faults = []
     for part in board.parts.values():
-        if part.component.family not in ("t45", "schmitt", "lvc", "isolator", "buck", "imu"):
+        if part.component.family not in DECOUPLED:
             continue
         for pin in part.component.pins:
             net = part.nets.get(pin.number, "")

@@ -162,8 +162,10 @@ LAYOUT: tuple[tuple[Callable[..., list[str]], str, Callable[[Board, Layout], Non
      on_layout(move("J200", 0.0, 1.0))),
     (layout_checks.near_capacitor, "mm from its capacitor",
      on_layout(move("C201", 0.0, -9.0))),
+    (layout_checks.near_capacitor, "U2: IN is",
+     on_layout(move("C1", 0.0, -9.0))),
     (layout_checks.near_connector, "the ESD part of CAM0_TRIGGER",
-     on_layout(move("D200", 40.0, -20.0))),
+     on_layout(move("D200", 0.0, -7.0))),
     (layout_checks.silk, "lies on a pad",
      on_layout(lambda board: board.texts.append((19.0, 72.0, 1.0, "WORD")))),
     (layout_checks.lengths, "SW is",
@@ -262,15 +264,23 @@ CABLES: tuple[tuple[str, Change], ...] = (
         "2": "trigger", "3": "exposure", "6": "ground"})),
     ("flir-opto: pin 1 is the camera's supply, and trigger here", cable("flir-opto", camera_pins={
         "1": "trigger", "4": "exposure"})),
-    ("alvium-usb: 2.4 V arrive, 3.4 V are high at 5 V", cable("alvium-usb", level="5 V")),
+    ("alvium-usb: exposure: 2.4 V arrive, 3.64 V are high at 5 V",
+     cable("alvium-usb", level="5 V")),
     ("daheng: its pull-up leaves", trigger_input(
         "daheng", kind="direct", high_v=1.9, low_v=0.1, highest_v=24,
         pulls_up={"v": 3.3, "ohm": 1000})),
     ("velodyne: serial: 4.06 V arrive", lidar_input(
         "velodyne", "serial", kind="direct", high_v=4.1, needs_ma=2, highest_v=15)),
     ("ouster: pulse: 2.36 V arrive at 10 mA", cable("ouster", level="3.3 V")),
+    ("velodyne: pulse: 3.4 V arrive as delivered, the input bears 3 V", lidar_input(
+        "velodyne", "pulse", kind="direct", highest_v=3.0)),
+    ("flir: 3.4 V arrive as delivered, the input bears 2 V", trigger_input(
+        "flir", kind="direct", highest_v=2.0)),
     ("livox: pulse: 5.25 V arrive, the input bears 3.6 V", cable("livox", level="5 V")),
-    ("u-blox: gives 1.8 V, 2.2 V are high", cable("u-blox", gives_v=[1.8, 1.8])),
+    ("u-blox: pps_in: 1.8 V arrive, 2.55 V are high", cable("u-blox", gives_v=[1.8, 1.8])),
+    ("alvium-g1: exposure: 2.4 V arrive, 2.55 V are high", cable("alvium-g1", short_v={})),
+    ("vn100: uart_in: 2.4 V arrive, 2.39 V are high: short_v is stale", cable("vn100", short_v={
+        "uart_in": 0.1, "ready1": 0.15})),
     ("vn100: serial is no pin of imu_uart", cable("vn100", wires={"serial": "RX"})),
     ("camera: supply and a signal are on one connector", supply_beside),
     ("flir of wiring.json has no cable", first_camera_lost),

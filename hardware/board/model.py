@@ -86,6 +86,8 @@ class Part:
     near: str = ""  # "REF.PIN": placed as close to it as possible
     label: str = ""  # on the silk screen, of a connector or jumper
     marks: tuple[Mark, ...] = ()  # words at its pins
+    delivered: str = ""  # where the shunt of a jumper is at delivery; empty: there is none
+    words: dict[str, str] = dataclasses.field(default_factory=dict)  # of a connector: use by pin
 
     def net(self, name: str) -> str:
         """Of a pin, by its name or number."""
@@ -132,7 +134,8 @@ class Board:
 
     def add(self, ref: str, component: Component, group: str, *, value: str = "",
             fitted: tuple[str, ...] = (), near: str = "", label: str = "",
-            marks: tuple[Mark, ...] = (), named: dict[str, str] | None = None,
+            marks: tuple[Mark, ...] = (), delivered: str = "",
+            words: dict[str, str] | None = None, named: dict[str, str] | None = None,
             **nets: str) -> Part:
         """Pins by name; pins that share a name share the net. As keywords: _1 for pin 1."""
         if ref in self.parts:
@@ -147,7 +150,8 @@ class Board:
         if set(wanted) - known:
             raise ValueError(f"{ref} has no pin {sorted(set(wanted) - known)}")
         part = Part(ref, component, found, self.sheets[-1][0], group, value or component.name,
-                    frozenset(fitted or self.variants), near, label, marks)
+                    frozenset(fitted or self.variants), near, label, marks, delivered,
+                    words or {})
         self.parts[ref] = part
         return part
 

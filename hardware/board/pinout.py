@@ -20,8 +20,9 @@ def word(net: str) -> str:
 
 
 def row(part: Part) -> str:
-    pins = [f"{pin.number} {word(part.nets[pin.number])}" if pin.number in part.nets else
-            f"{pin.number} open" for pin in part.component.pins if pin.number != "MP"]
+    words = {number: word(net) for number, net in part.nets.items()} | part.words
+    pins = [f"{pin.number} {words.get(pin.number, 'open')}" for pin in part.component.pins
+            if pin.number != "MP"]
     lines, line = [], f"- **{part.label or part.ref}** ({part.ref}, {part.component.mpn}):"
     for i, text in enumerate(pins):
         piece = f" {text}{',' if i + 1 < len(pins) else ''}"

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 from typing import Iterable
 
+from catalogue import SHUNT
 from footprints import ALL
 from model import Board, Part, box_at
 
@@ -40,6 +42,8 @@ def bom(board: Board, variant: str) -> str:
     for part in bought(board, variant):
         key = (part.component.mpn, part.component.name, part.component.footprint)
         groups.setdefault(key, []).append(part)
+    if shunted := shunts(board, variant):
+        groups[SHUNT.mpn, SHUNT.name, SHUNT.footprint] = shunted
     rows = []
     for (mpn, name, footprint), parts in sorted(
             groups.items(), key=lambda item: number(item[1][0].ref)):
@@ -48,6 +52,12 @@ def bom(board: Board, variant: str) -> str:
         rows.append([name, ",".join(refs), footprint, "", str(len(refs)), mpn, component.maker,
                      "; ".join(component.alternates), component.source])
     return table(BOM, rows)
+
+
+def shunts(board: Board, variant: str) -> list[Part]:
+    """One for each jumper that is set at delivery; SH200 goes onto JP200."""
+    return [dataclasses.replace(part, ref=part.ref.replace("JP", "SH"), component=SHUNT, nets={})
+            for part in bought(board, variant) if part.delivered]
 
 
 def placement(board: Board, variant: str) -> str:
@@ -65,7 +75,8 @@ def placement(board: Board, variant: str) -> str:
 
 
 def price(board: Board, variant: str) -> float:
-    return sum(part.component.usd for part in bought(board, variant))
+    return sum(part.component.usd
+               for part in [*bought(board, variant), *shunts(board, variant)])
 
 
 def vrml(board: Board) -> str:

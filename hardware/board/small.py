@@ -18,7 +18,8 @@ def leds() -> Board:
     board.rails = {"+5V": Rail(4.0, 4.7, 5.25, 150)}
     board.sheet("counter", "Counter and LEDs")
     g = "counter"
-    board.add("J1", gh(3), g, label="5V TEST GND", _1="+5V", _2="TEST", _3="GND", MP="GND")
+    board.add("J1", gh(3), g, label="5V TEST GND", words={"1": "5 V in"}, _1="+5V", _2="TEST",
+              _3="GND", MP="GND")
     board.add("R1", resistor("47k"), g, near="U1.2", _1="TEST", _2="GND")
     board.add("U1", c.INVERTER, g, A="TEST", GND="GND", Y="CLOCK", VCC="+5V")
     board.add("U2", c.COUNTER, g, CP="CLOCK", MR="GND", GND="GND", VCC="+5V", Q0="BIT0", Q1="BIT1",
@@ -64,13 +65,13 @@ def adis() -> Board:
     board.rails = {"+3V3": Rail(3.2, 3.3, 3.4, 200)}
     board.sheet("adapter", "Adapter")
     g = "adapter"
-    board.add("J1", gh(9), g, label="IMU SPI", _1="+3V3", _2="GND", _3="SCLK", _4="DIN", _5="DOUT",
-              _6="CS", _8="READY", MP="GND")
+    board.add("J1", gh(9), g, label="IMU SPI", words={"1": "3.3 V in"}, _1="+3V3", _2="GND",
+              _3="SCLK", _4="DIN", _5="DOUT", _6="CS", _8="READY", MP="GND")
     board.add("J2", c.RIBBON, g, label="ADIS 1", _1="RESET", _2="SCLK", _3="CS", _4="DOUT",
               _6="DIN", _7="GND", _8="GND", _9="GND", _10="+3V3", _11="+3V3", _12="+3V3",
               _13="DIO1", _14="DIO2")
     board.add("JP1", jumper(3), g, label="READY", marks=(("1", -2.05, 0, 0), ("2", 7.13, 0, 0)),
-              _1="DIO1", _2="READY", _3="DIO2")
+              delivered="1", _1="DIO1", _2="READY", _3="DIO2")
     board.add("R1", resistor("10k"), g, near="J2.1", _1="RESET", _2="+3V3")
     board.add("C1", c.C100N, g, near="J2.10", _1="+3V3", _2="GND")
     board.add("C2", c.C10U, g, near="J2.12", _1="+3V3", _2="GND")

@@ -56,7 +56,7 @@ def farad(board: Board, ref: str) -> float:
 
 def trigger_case(board: Board, row: cables.Cable) -> Case:
     """A 74LVC1T45 at its weakest into the input, which takes all the current it may."""
-    volts, inside = {"5 V": (4.5, 22.0), "3.3 V": (3.0, 29.0), "1.8 V": (1.7, 112.0)}[row.level]
+    volts, _, inside = cables.RAILS[row.level]
     load = max(row.draws_ma, 0.01)
     netlist = f"""
 V1 source 0 PULSE(0 {volts} 1u 2n 2n 200u 1m)
@@ -77,7 +77,7 @@ C2 camera 0 50p
 
 def exposure_case(board: Board, level: str) -> Case:
     """An open drain that sinks 25 mA, 5 m of cable, pull-up through the diode."""
-    volts = {"5 V": 4.5, "3.3 V": 3.2, "1.8 V": 1.77}[level]
+    volts, _, _ = cables.RAILS[level]
     high, low = checks.between(checks.SCHMITT_HIGH, volts), checks.between(checks.SCHMITT_LOW,
                                                                            volts)
     netlist = f"""

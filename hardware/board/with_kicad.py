@@ -152,7 +152,8 @@ SIDES = {"front": ("F_Silkscreen", "F_Mask", "F_Cu"), "back": ("B_Silkscreen", "
 
 
 def picture(board: Board, work: pathlib.Path, side: str, target: pathlib.Path) -> None:
-    """Of one side, as a pool would make it: silk screen, mask openings, copper."""
+    """Of one side, as one sees it: silk screen, mask openings, copper. Gerbers of the back are as
+    seen through the board, so that side is mirrored."""
     silk, mask, copper = (str(next((work / "gerbers").glob(f"*{name}.gbr")))
                           for name in SIDES[side])
     edge = str(next((work / "gerbers").glob("*Edge_Cuts.gbr")))
@@ -160,8 +161,9 @@ def picture(board: Board, work: pathlib.Path, side: str, target: pathlib.Path) -
     layers = [*((path, "#FFFFFFFF") for path in drills), (silk, "#F5F5F0FF"), (mask, "#D8B75AB0"),
               (edge, "#F0F0F0FF"), (copper, "#1F7A4AFF")]
     arguments = [text for path, colour in layers for text in ("--foreground", colour, path)]
-    subprocess.run(["gerbv", "--export=png", f"--output={target}", "--dpi=400x400", "--border=2",
-                    "--background", "#0E4D2C", *arguments], check=True,
+    mirror = ["--mirror=Y"] if side == "back" else []
+    subprocess.run(["gerbv", *mirror, "--export=png", f"--output={target}", "--dpi=400x400",
+                    "--border=2", "--background", "#0E4D2C", *arguments], check=True,
                    capture_output=True)
 
 
