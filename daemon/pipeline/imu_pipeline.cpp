@@ -121,10 +121,15 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     const auto arrival = arrival_delay(departed, received, translator_);
     const auto impossible = arrival ? arrival->doubt : std::nullopt;
     // Also those that are impossible: the others alone would seem to be as prompt as usual.
-    const bool fits = !pulse_filter_.believed().doubt(pulse);
-    translator_.heard(departures_, {departed, received}, fits);
-    translator_.heard(samples_, {pulse.at, received}, fits);
-    const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, impossible);
+    // After those from the future, one that was held up does not fit because the pace may have
+    // wandered: it is one of them.
+    const bool ahead = step_possible_.mostly_early() && pulse_filter_.confirmed();
+    const PulseHistory& believed = pulse_filter_.believed();
+    const auto misfit = ahead ? believed.doubt_at_pace(pulse) : believed.doubt(pulse);
+    translator_.heard(departures_, {departed, received}, !misfit);
+    translator_.heard(samples_, {pulse.at, received}, !misfit);
+    const auto doubt =
+        pulse_filter_.judge(pulse, contact.exchanges, ahead && !impossible ? misfit : impossible);
     const bool time_doubted = doubt && doubt->reason == EventReason::implausible_time;
     const Duration apart{time_doubted ? doubt->said - doubt->expected : 0};
     const Promptness promptness =
@@ -132,6 +137,7 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
                 : Promptness::unknown;
     if (doubt) {
         step_promptness_.doubted(promptness);
+        step_possible_.doubted(impossible ? Promptness::early : Promptness::usual);
         if (!arrival || impossible || contact.contradicted ||
             !may_adopt(promptness, *doubt, contact.exchanges))
             return doubt;
@@ -146,6 +152,7 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
         translator_.clock_continues();
     }
     step_promptness_.believed();
+    step_possible_.believed();
     if (arrival) delays_.learn(arrival->delay, received);
     believed_life_ = clock_life_;
     return std::nullopt;
@@ -164,6 +171,7 @@ bool ImuPipeline::may_adopt(Promptness promptness, const Implausibility& doubt,
     if (clock_life_ != believed_life_) return pulse_filter_.stepped(exchanges);
     const auto samples = translator_.confirms_others(samples_);
     const auto departures = translator_.confirms_others(departures_);
+    if (step_possible_.mostly_early()) return false;  // however long they agree
     // Early though exchanges confirm them: the clock stepped, and the estimate does not know yet.
     const bool early = step_promptness_.mostly_early();
     if (samples && departures)

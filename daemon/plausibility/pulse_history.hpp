@@ -26,6 +26,8 @@ class PulseHistory {
         : pace_(period, tolerance), wander_parts_(wander_parts) {}
 
     std::optional<Implausibility> doubt(const Pulse& pulse) const;
+    /// The same if the pace does not wander.
+    std::optional<Implausibility> doubt_at_pace(const Pulse& pulse) const;
     void learn(const Pulse& pulse);
     bool repeats(const Pulse& pulse) const {
         return newest_ && newest_->number == pulse.number && newest_->at == pulse.at;
@@ -33,6 +35,8 @@ class PulseHistory {
     void rebase() { newest_.reset(); }
 
  private:
+    std::optional<Implausibility> doubt(const Pulse& pulse, Duration wander) const;
+
     RunningEstimate pace_;
     std::int64_t wander_parts_;
     std::optional<Pulse> newest_;

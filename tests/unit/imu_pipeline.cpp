@@ -216,6 +216,21 @@ TEST_CASE("imu_pipeline: a clock that is known to 50 us tells a period from a ne
     CHECK(withheld < 100);  // five exchanges
 }
 
+TEST_CASE("imu_pipeline: samples from the future are not believed, however long they agree") {
+    ImuBench bench;
+    constexpr std::uint32_t honest = 400;
+    for (std::uint32_t i = 0; i < honest + 12'000; ++i) {
+        if (i % 20 == 0) bench.exchange(bench.instant(i));
+        const HostTime host = bench.instant(i);
+        const Duration off = i < honest ? Duration{} : milliseconds(2);
+        const Duration late = i % 10 == 0 ? microseconds(2500) : Duration{};  // it is possible then
+        bench.pipeline.add(sample(i, test::Pipelines::to_board(host) + off),
+                           host + milliseconds(1) + late);
+        const bool published = !bench.published().empty();
+        if (i > honest) REQUIRE_FALSE(published);
+    }
+}
+
 TEST_CASE("imu_pipeline: on a busy host, a clock that steps does not pass for a new phase") {
     ImuBench bench;
     std::mt19937 random{1};

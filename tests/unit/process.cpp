@@ -22,6 +22,10 @@ using namespace versavis;
 using namespace versavis::ring;
 using test::in_process;
 
+#ifndef CLONE_NEWTIME  // glibc 2.35 does not know it yet
+#define CLONE_NEWTIME 0x80
+#endif
+
 namespace {
 
 Constants own_constants() {

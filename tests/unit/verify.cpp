@@ -309,6 +309,44 @@ TEST_CASE("verify: what is wrong is found, where it is, and nowhere else") {
     }
 }
 
+TEST_CASE("verify: stamps by the camera's clock or by arrival are held against the output clock") {
+    Drive drive;
+    const StampKind kind = GENERATE(StampKind::camera_ptp, StampKind::arrival);
+    for (StampedFrame& each : drive.frames(0)) {
+        each.frame.flags = static_cast<std::uint32_t>(kind);
+        each.frame.board_time = {};
+    }
+    CHECK(verdict_of(verify(drive.evidence()), "cam0").grade() == Grade::plausible);
+    for (std::size_t i = 100; i < 200; ++i) drive.frames(0)[i].time.ns += 37'000 * millisecond;
+    drive.frames(0)[300].time.ns -= millisecond;
+    const Verification verification = verify(drive.evidence());
+    const StreamVerdict& verdict = verdict_of(verification, "cam0");
+    INFO(to_text(verification));
+    CHECK(find_span(verdict, Finding::other_second) != nullptr);
+    CHECK(find_span(verdict, Finding::output_time) != nullptr);
+    CHECK(untrusted_items(verdict) >= 101);
+    CHECK(untrusted_items(verdict) <= 102);  // the one after the jump goes back
+}
+
+TEST_CASE("verify: the worst second is that with the most items of the worst grade") {
+    Drive drive;
+    drive.frames(0)[10].time.ns += 5 * millisecond;
+    for (std::size_t i = 200; i < 230; ++i) drive.frames(0)[i].time.ns += millisecond;
+    drive.frames(0)[214].time.ns += millisecond;
+    const Verification verification = verify(drive.evidence());
+    const auto worst = verdict_of(verification, "cam0").worst_second;
+    REQUIRE(worst);
+    CHECK(worst->finding == Finding::output_time);
+    CHECK(worst->second == 11);
+    CHECK(worst->items == 20);
+    CHECK(worst->worst.ns > 1'500'000);
+    CHECK_THAT(verification.sentence(), Catch::StartsWith("Not to be trusted: cam0, seconds 1"));
+    CHECK(to_json(verification)["streams"][0]["worst_second"]["items"] == 20);
+    CHECK(to_json(verification)["streams"][2]["worst_second"].is_null());
+    CHECK_THAT(to_text(verification),
+               Catch::Contains("cam0, worst second: 11, 20 frames: its time"));
+}
+
 TEST_CASE("verify: without a witness a stamp is plausible, not proved") {
     Drive drive;
     const auto check = [&](const char* name, Finding finding) {

@@ -508,10 +508,12 @@ StreamVerdict CameraJudge::finish(StreamOrder order) const {
         }
         for (const auto& [finding, by] : claim.findings) verdict.add(finding, by);
         if (const auto by = pictures.off(claim.frame->time)) verdict.add(Finding::pictures, *by);
-        if (!stamped_by_board(frame)) continue;
-        clock_.judge({frame.board_time, frame.host_time, claim.frame->time, frame.sigma_ns,
-                      frame.epoch, frame.flags},
-                     verdict);
+        const StampTimes times{frame.board_time, frame.host_time, claim.frame->time,
+                               frame.sigma_ns,   frame.epoch,     frame.flags};
+        if (stamped_by_board(frame))
+            clock_.judge(times, verdict);
+        else
+            clock_.judge_by_host_clock(times, verdict);
     }
     for (const RecordedGap& gap : camera_.gaps) verdict.add_lost(gap.items);
     verdict.add_damaged(camera_.impossible);

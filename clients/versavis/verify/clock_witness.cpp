@@ -32,6 +32,16 @@ bool whole_seconds(Duration off) {
            std::min(rest, seconds(1).ns - rest) < near_second.ns;
 }
 
+/// One that was held so that time does not go back is late.
+bool within_error(Duration off, const StampTimes& stamp) {
+    const bool held = (stamp.flags & flag_clamped) != 0;
+    return absolute(off) <= allowed_error(stamp.sigma_ns) || (held && off.ns > 0);
+}
+
+Finding output_finding(Duration off) {
+    return whole_seconds(off) ? Finding::other_second : Finding::output_time;
+}
+
 template <class Dated>
 bool by_epoch_and_host(const Dated& a, const Dated& b) {
     return a.epoch != b.epoch ? a.epoch < b.epoch : a.host < b.host;
@@ -177,10 +187,8 @@ void ClockWitness::judge_output(const StampTimes& stamp, VerdictBuilder& verdict
         verdict.add(Finding::no_output_reading);
         return;
     }
-    const Duration allowed = allowed_error(stamp.sigma_ns);
-    const bool held = (stamp.flags & flag_clamped) != 0;
     const auto fits = [&](const std::optional<Duration>& off) {
-        return off && (absolute(*off) <= allowed || (held && off->ns > 0));
+        return off && within_error(*off, stamp);
     };
     if (fits(by_host)) return;
     if (fits(by_pulses)) {
@@ -190,7 +198,15 @@ void ClockWitness::judge_output(const StampTimes& stamp, VerdictBuilder& verdict
         return;
     }
     const Duration off = by_host ? *by_host : *by_pulses;
-    verdict.add(whole_seconds(off) ? Finding::other_second : Finding::output_time, off);
+    verdict.add(output_finding(off), off);
+}
+
+void ClockWitness::judge_by_host_clock(const StampTimes& stamp, VerdictBuilder& verdict) const {
+    const auto off = off_host_clock(stamp);
+    if (!off)
+        verdict.add(Finding::no_output_reading);
+    else if (!within_error(*off, stamp))
+        verdict.add(output_finding(*off), *off);
 }
 
 }  // namespace versavis::client

@@ -33,6 +33,9 @@ class ClockWitness {
     /// Adds what contradicts the times, or what is missing to prove them.
     void judge(const StampTimes& stamp, VerdictBuilder& verdict) const;
 
+    /// The same of one that is not the board's: the output clock alone was recorded beside it.
+    void judge_by_host_clock(const StampTimes& stamp, VerdictBuilder& verdict) const;
+
     /// The boot of the board that was running at `host`; null: none is recorded.
     const ClockBounds* life(BoardTime board, HostTime host) const;
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,14 @@ struct FindingSpan {
     Duration worst;  ///< by amount; 0: it has none
 };
 
+/// The second with the most items of the worst grade, and the finding about them.
+struct WorstSecond {
+    Finding finding{};
+    std::int64_t second = 0;
+    std::uint64_t items = 0;
+    Duration worst;  ///< as of FindingSpan
+};
+
 struct SecondVerdict {
     std::uint64_t items = 0;
     std::uint64_t withheld = 0;
@@ -92,6 +101,7 @@ struct StreamVerdict {
     Duration sigma;                         ///< median
     std::map<std::int64_t, SecondVerdict> seconds;
     std::vector<FindingSpan> findings;  ///< worst first
+    std::optional<WorstSecond> worst_second;
 
     Grade grade() const;
 };

@@ -29,20 +29,35 @@ std::string amount_text(Duration amount) {
     return fmt::format("{:+.6f} s", us * 1e-6);
 }
 
-std::string finding_text(const StreamVerdict& stream, const FindingSpan& span) {
+/// `found`: a FindingSpan or a WorstSecond.
+template <class Found>
+std::string about_items(const StreamVerdict& stream, const Found& found) {
     return fmt::format(
-        "{}, {}, {} {}{}: {}{}", stream.name, span_text(span), span.items,
-        stream.kind == "camera" ? "frame" : "sample", span.items == 1 ? "" : "s",
-        words_of(span.finding),
-        span.worst.ns == 0 ? "" : fmt::format(" (by up to {})", amount_text(span.worst)));
+        "{} {}{}: {}{}", found.items, stream.kind == "camera" ? "frame" : "sample",
+        found.items == 1 ? "" : "s", words_of(found.finding),
+        found.worst.ns == 0 ? "" : fmt::format(" (by up to {})", amount_text(found.worst)));
 }
 
-/// Of all streams, the first finding of a grade; null: there is none.
-std::string first_finding(const Verification& verification, Grade grade) {
+std::string finding_text(const StreamVerdict& stream, const FindingSpan& span) {
+    return fmt::format("{}, {}, {}", stream.name, span_text(span), about_items(stream, span));
+}
+
+bool is_larger(const FindingSpan& a, const FindingSpan& b) {
+    return a.items != b.items ? a.items > b.items : absolute(a.worst) > absolute(b.worst);
+}
+
+/// Of all streams, the finding of a grade about the most items; empty: there is none.
+std::string largest_finding(const Verification& verification, Grade grade) {
+    const StreamVerdict* of = nullptr;
+    const FindingSpan* largest = nullptr;
     for (const StreamVerdict& stream : verification.streams)
-        for (const FindingSpan& span : stream.findings)
-            if (grade_of(span.finding) == grade) return finding_text(stream, span);
-    return "";
+        for (const FindingSpan& span : stream.findings) {
+            if (grade_of(span.finding) != grade) continue;
+            if (largest != nullptr && !is_larger(span, *largest)) continue;
+            of = &stream;
+            largest = &span;
+        }
+    return largest == nullptr ? "" : finding_text(*of, *largest);
 }
 
 std::uint64_t graded(const Verification& verification, Grade grade) {
@@ -52,19 +67,25 @@ std::uint64_t graded(const Verification& verification, Grade grade) {
     return count;
 }
 
+json amount_or_null(Duration amount) { return amount.ns == 0 ? json() : json(amount.ns); }
+
 json to_json(const StreamVerdict& stream) {
     json findings = json::array();
     for (const FindingSpan& span : stream.findings) {
-        json one{{"finding", name_of(span.finding)},
-                 {"verdict", to_string(grade_of(span.finding))},
-                 {"text", words_of(span.finding)},
-                 {"from_s", span.from_s},
-                 {"to_s", span.to_s},
-                 {"items", span.items},
-                 {"worst_ns", nullptr}};
-        if (span.worst.ns != 0) one["worst_ns"] = span.worst.ns;
-        findings.push_back(std::move(one));
+        findings.push_back(json{{"finding", name_of(span.finding)},
+                                {"verdict", to_string(grade_of(span.finding))},
+                                {"text", words_of(span.finding)},
+                                {"from_s", span.from_s},
+                                {"to_s", span.to_s},
+                                {"items", span.items},
+                                {"worst_ns", amount_or_null(span.worst)}});
     }
+    json worst;
+    if (const auto& found = stream.worst_second)
+        worst = {{"second", found->second},
+                 {"finding", name_of(found->finding)},
+                 {"items", found->items},
+                 {"worst_ns", amount_or_null(found->worst)}};
     json seconds = json::array();
     for (const auto& [second, verdict] : stream.seconds)
         seconds.push_back(json{{"second", second},
@@ -81,6 +102,7 @@ json to_json(const StreamVerdict& stream) {
             {"withheld", stream.withheld},
             {"lost", stream.lost},
             {"sigma_ns", stream.sigma.ns},
+            {"worst_second", std::move(worst)},
             {"findings", std::move(findings)},
             {"seconds", std::move(seconds)}};
 }
@@ -98,12 +120,12 @@ std::string Verification::sentence() const {
         withheld == 0 ? "" : fmt::format("; {} more were published as suspect", withheld);
     switch (grade()) {
         case Grade::untrusted:
-            return "Not to be trusted: " + first_finding(*this, Grade::untrusted) + ".";
+            return "Not to be trusted: " + largest_finding(*this, Grade::untrusted) + ".";
         case Grade::plausible:
             if (streams.empty()) return "There is nothing to verify.";
             return fmt::format("Nothing contradicts the {} stamps, but {} are not proved: {}.",
                                items - withheld, graded(*this, Grade::plausible),
-                               first_finding(*this, Grade::plausible));
+                               largest_finding(*this, Grade::plausible));
         case Grade::proved: break;
     }
     return fmt::format("Synchronised: all {} stamps of {} stream{} over {} s are proved{}.",
@@ -145,6 +167,10 @@ std::string to_text(const Verification& verification) {
         verification.exchanges, verification.exchanges == 1 ? "" : "s", verification.board_lives,
         verification.board_lives == 1 ? "" : "s",
         static_cast<double>(verification.bounds_width.ns) * 1e-3);
+    for (const StreamVerdict& stream : verification.streams)
+        if (const auto& found = stream.worst_second)
+            text += fmt::format("{}, worst second: {}, {}\n", stream.name, found->second,
+                                about_items(stream, *found));
     for (const StreamVerdict& stream : verification.streams)
         for (std::size_t i = 0; i < stream.findings.size(); ++i) {
             if (i == most_lines) {
