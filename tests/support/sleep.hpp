@@ -3,8 +3,10 @@
 #pragma once
 
 #include <sys/types.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdint>
 #include <string>
 #include <thread>
@@ -14,6 +16,14 @@
 #include "versavis/time.hpp"
 
 namespace versavis::test {
+
+/// Of <sys/syscall.h> since Linux 5.16.
+constexpr long futex_waitv_number = 449;
+
+/// Without that, nobody sleeps on several words: they are looked at now and then.
+inline bool kernel_waits_for_any() {
+    return ::syscall(futex_waitv_number, nullptr, 0, 0, nullptr, 0) == -1 && errno == EINVAL;
+}
 
 /// Until the thread of this number sleeps in the kernel.
 inline void await_sleep(pid_t thread) { Rest(std::to_string(thread)).wait(); }

@@ -48,10 +48,6 @@ std::chrono::nanoseconds span_of(const Wait& wait) {
     return std::chrono::steady_clock::now() - begun;
 }
 
-bool kernel_waits_for_any() {
-    return ::syscall(SYS_futex_waitv, nullptr, 0, 0, nullptr, 0) == -1 && errno == EINVAL;
-}
-
 long sleeps_of_this_thread() {
     rusage usage{};
     ::getrusage(RUSAGE_THREAD, &usage);
@@ -62,7 +58,7 @@ long sleeps_of_this_thread() {
 bool forbid_waiting_for_any(unsigned error) {
     std::array<sock_filter, 4> filter{
         {BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
-         BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_futex_waitv, 0, 1),
+         BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, test::futex_waitv_number, 0, 1),
          BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | error),
          BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)}};
     const sock_fprog program{filter.size(), filter.data()};
@@ -73,7 +69,7 @@ bool forbid_waiting_for_any(unsigned error) {
 }  // namespace
 
 TEST_CASE_METHOD(FutexWords, "futex: a wait without news lasts as long as was asked") {
-    if (!kernel_waits_for_any()) {
+    if (!test::kernel_waits_for_any()) {
         WARN("not tested: this kernel cannot wait for several words");
         return;
     }
@@ -88,7 +84,7 @@ TEST_CASE_METHOD(FutexWords, "futex: a wait without news lasts as long as was as
 
 TEST_CASE_METHOD(FutexWords, "futex: each of several words wakes who waits for all [threads]",
                  "[threads]") {
-    if (!kernel_waits_for_any()) {
+    if (!test::kernel_waits_for_any()) {
         WARN("not tested: this kernel cannot wait for several words");
         return;
     }
