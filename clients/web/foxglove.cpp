@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -207,6 +208,39 @@ std::optional<std::string> FoxgloveSession::next_text(HostTime now) {
     return text;
 }
 
+namespace {
+
+/// What has waited for so much longer than others of its stream is passed over if something newer
+/// has come. What is played again is as old as it was recorded.
+constexpr Duration stale_after = seconds(1);
+
+/// Small messages in a row, after which an image goes first: a connection too slow for all of them
+/// would show none.
+constexpr unsigned most_in_a_row = 64;
+
+HostTime came(const ImuMetadata& sample) { return sample.host_time; }
+HostTime came(const FrameMetadata& frame) { return frame.arrival; }
+
+/// The next item that is not stale, or the newest.
+template <class Stream, class Subscription>
+auto next_fresh(Stream& stream, HostTime now, Subscription& subscription) {
+    auto item = stream.next();
+    if (!item) {
+        subscription.missed += item.error().lost;
+        if (item.error().why == ring::Pause::restarted) subscription.least_age.reset();
+        return item;
+    }
+    const Duration age = now - came(item->data);
+    subscription.least_age = std::min(subscription.least_age.value_or(age), age);
+    if (age - *subscription.least_age <= stale_after) return item;
+    auto newest = stream.latest();
+    if (!newest) return item;
+    subscription.missed += newest->number - item->number;
+    return newest;
+}
+
+}  // namespace
+
 std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscription& subscription,
                                                        HostTime now) {
     const Channel& channel = *subscription.channel;
@@ -223,9 +257,9 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
     }
     if (auto* frames = std::get_if<FrameStream>(&subscription.reader)) {
         const bool newest = channel.content == Content::image;
-        const auto frame = newest ? frames->latest() : frames->next();
+        const auto frame = newest ? frames->latest() : next_fresh(*frames, now, subscription);
         if (!frame) {
-            subscription.missed += frame.error().lost;
+            if (newest) subscription.missed += frame.error().lost;
             return std::nullopt;
         }
         const OutputTime time = frame->time.output();
@@ -249,22 +283,23 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
         return std::nullopt;
     }
     if (auto* samples = std::get_if<ImuStream>(&subscription.reader)) {
-        const auto sample = samples->next();
-        if (!sample) {
-            subscription.missed += sample.error().lost;
-            return std::nullopt;
-        }
+        const auto sample = next_fresh(*samples, now, subscription);
+        if (!sample) return std::nullopt;
         const OutputTime time = sample->time.output();
         return message_head(id, time) + client::ros_imu(time, stream, sample->data);
     }
     if (auto* events = std::get_if<EventStream>(&subscription.reader)) {
         const auto event = events->next();
-        if (!event) return std::nullopt;
+        if (!event) {
+            subscription.missed += event.error().lost;
+            return std::nullopt;
+        }
         return message_head(id, event->time.output()) +
                client::note_message(stream, item_of(ring::StreamKind::events, *event));
     }
     if (auto* sentences = std::get_if<NmeaStream>(&subscription.reader)) {
         const auto sentence = sentences->next();
+        if (!sentence) subscription.missed += sentence.error().lost;
         std::string text;
         if (!sentence || !add_payload(text, *sentence)) return std::nullopt;
         const OutputTime time = sentence->time.output();
@@ -277,13 +312,26 @@ std::optional<std::string> FoxgloveSession::message_of(std::uint32_t id, Subscri
 }
 
 std::optional<std::string> FoxgloveSession::next_message(HostTime now) {
-    // In turns, beginning after the one that was served last.
-    auto next = subscriptions_.upper_bound(last_);
+    const bool image_first = small_in_a_row_ >= most_in_a_row;
+    for (const bool image : {image_first, !image_first})
+        if (auto message = next_message(image, now)) {
+            small_in_a_row_ = image ? 0 : small_in_a_row_ + 1;
+            return message;
+        }
+    return std::nullopt;
+}
+
+/// Of images, or of what is small: in turns, beginning after the one that was served last.
+std::optional<std::string> FoxgloveSession::next_message(bool image, HostTime now) {
+    std::uint32_t& last = last_[image ? 1 : 0];
+    auto next = subscriptions_.upper_bound(last);
     for (std::size_t i = 0; i < subscriptions_.size(); ++i, ++next) {
         if (next == subscriptions_.end()) next = subscriptions_.begin();
+        const Content content = next->second.channel->content;
+        if ((content == Content::image || content == Content::jpeg) != image) continue;
         auto message = message_of(next->first, next->second, now);
         if (!message) continue;
-        last_ = next->first;
+        last = next->first;
         return message;
     }
     return std::nullopt;

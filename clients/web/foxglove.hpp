@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Foxglove's WebSocket protocol, for Foxglove and Lichtblick: what a viewer subscribes to, and the
-// messages for it, without the connection. Images are the newest when the connection can take one;
-// of other streams each item is sent that the ring still has. What a viewer misses is counted, and
-// it is shown that. Used by one thread.
+// messages for it, without the connection. What is small goes first. Images are the newest when the
+// connection can take one; samples and stamps that have waited for a second are passed over. What a
+// viewer misses is counted, and it is shown that. Used by one thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -52,6 +53,7 @@ class FoxgloveSession {
         std::uint64_t version = 0;  ///< of the JPEG
         std::string problem{};      ///< why there is none, or what is wrong, as it was reported
         std::uint64_t missed = 0;
+        std::optional<Duration> least_age{};  ///< of its items, when they were read
     };
 
     void look_for_channels();
@@ -60,6 +62,7 @@ class FoxgloveSession {
     void report(int level, const std::string& message);
     void report_missed(HostTime now);
     void report_once(Subscription& subscription, const std::string& problem);
+    std::optional<std::string> next_message(bool image, HostTime now);
     std::optional<std::string> message_of(std::uint32_t id, Subscription& subscription,
                                           HostTime now);
 
@@ -69,7 +72,8 @@ class FoxgloveSession {
     std::map<std::uint32_t, Channel> channels_;
     std::map<std::string, ring::StreamKind> streams_;
     std::map<std::uint32_t, Subscription> subscriptions_;
-    std::uint32_t last_ = 0;  ///< subscription that was served last
+    std::array<std::uint32_t, 2> last_{};  ///< served last, of what is small, and of images
+    unsigned small_in_a_row_ = 0;
     HostTime searched_{INT64_MIN};
     HostTime reported_{INT64_MIN};
 };

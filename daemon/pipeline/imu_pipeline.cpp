@@ -137,7 +137,8 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
                 : Promptness::unknown;
     if (doubt) {
         step_promptness_.doubted(promptness);
-        step_possible_.doubted(impossible ? Promptness::early : Promptness::usual);
+        const bool not_yet = impossible && impossible->reason == EventReason::not_yet;
+        step_possible_.doubted(not_yet ? Promptness::early : Promptness::usual);
         if (!arrival || impossible || contact.contradicted ||
             !may_adopt(promptness, *doubt, contact.exchanges))
             return doubt;

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recording/mcap_reader.hpp"
 
+#include <lz4frame.h>
 #include <sys/resource.h>
+#include <zstd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <random>
+#include <tuple>
 
 #include "pixel_formats.hpp"
 #include "recording/recording.hpp"
@@ -72,7 +77,112 @@ std::string damage(std::string bytes, std::mt19937_64& random) {
     return bytes;
 }
 
+std::string packed(const std::string& records, const std::string& compression) {
+    const bool lz4 = compression == "lz4";
+    std::string out(
+        lz4 ? LZ4F_compressFrameBound(records.size(), nullptr) : ZSTD_compressBound(records.size()),
+        '\0');
+    out.resize(
+        lz4 ? LZ4F_compressFrame(out.data(), out.size(), records.data(), records.size(), nullptr)
+            : ZSTD_compress(out.data(), out.size(), records.data(), records.size(), 1));
+    return out;
+}
+
+template <class Number>
+Number number_at(const std::string& bytes, std::size_t at) {
+    Number number{};
+    REQUIRE(at + sizeof number <= bytes.size());
+    std::memcpy(&number, bytes.data() + at, sizeof number);
+    return number;
+}
+
+/// A chunk: begin, end, size, checksum, name of the compression, records.
+constexpr std::size_t chunk_size_at = 16;
+constexpr std::size_t chunk_compression_at = 28;
+
+/// A recording without compression, as a program that compresses writes it, and without a summary.
+/// `change` alters the content of a chunk by its number.
+std::string compressed(const std::string& whole, const std::string& compression,
+                       const std::function<void(std::size_t, std::string&)>& change) {
+    constexpr char data_end = 15;
+    std::string out = whole.substr(0, 8);
+    std::size_t chunks = 0;
+    for (std::size_t at = 8; whole[at] != data_end;) {
+        const auto size = number_at<std::uint64_t>(whole, at + 1);
+        std::string content = whole.substr(at + 9, size);
+        if (whole[at] == 6) {
+            REQUIRE(number_at<std::uint32_t>(content, chunk_compression_at) == 0);
+            const auto bytes_of = [](auto number) {
+                return std::string(reinterpret_cast<const char*>(&number), sizeof number);
+            };
+            const std::string records =
+                packed(content.substr(chunk_compression_at + 12), compression);
+            content = content.substr(0, chunk_compression_at) +
+                      bytes_of(static_cast<std::uint32_t>(compression.size())) + compression +
+                      bytes_of(std::uint64_t{records.size()}) + records;
+            change(chunks++, content);
+        }
+        out += test::RecordingFile::record(static_cast<std::uint8_t>(whole[at]), content);
+        at += 9 + size;
+    }
+    return out + test::RecordingFile::record(data_end, std::string(4, '\0')) +
+           test::RecordingFile::record(2, std::string(20, '\0')) + whole.substr(0, 8);
+}
+
+using ItemSeen = std::tuple<std::string, std::uint64_t, std::int64_t, std::string>;
+
+/// Those of a file, and what is damaged.
+std::pair<std::vector<ItemSeen>, std::vector<std::string>> items_of(const std::string& path) {
+    const auto recording = Recording::open(path);
+    REQUIRE(recording);
+    std::vector<ItemSeen> items;
+    REQUIRE(recording->for_each({}, [&](const client::RecordedItem& item) {
+        items.emplace_back(
+            item.stream, item.number, item.time.ns,
+            std::string(reinterpret_cast<const char*>(item.payload.data()), item.payload.size()));
+        return true;
+    }));
+    return {items, recording->damages()};
+}
+
 }  // namespace
+
+TEST_CASE("mcap_reader: chunks of lz4 and zstd are read, and a bad one costs only itself") {
+    const ReaderSample sample;
+    const std::string whole = test::sample_recording(1, false, false, mono8);
+    sample.write(whole);
+    const auto all = items_of(sample.path).first;
+    REQUIRE(all.size() > 100);
+    const std::string compression = GENERATE("lz4", "zstd");
+    sample.write(compressed(whole, compression, [](std::size_t, std::string&) {}));
+    const auto [items, damages] = items_of(sample.path);
+    CHECK(damages.empty());
+    CHECK(items == all);
+
+    const std::function<void(std::string&)> wrong[] = {
+        [](std::string& content) { content[content.size() / 2] ^= 1; },
+        [](std::string& content) { content.back() ^= 0x55; },
+        [](std::string& content) { ++content[chunk_size_at]; },
+        [](std::string& content) { --content[chunk_size_at]; },
+        [](std::string& content) { content.replace(chunk_size_at, 8, 8, '\x7F'); },
+        [](std::string& content) { content.resize(content.size() - 8); },
+    };
+    for (std::size_t i = 0; i < std::size(wrong); ++i) {
+        CAPTURE(compression, i);
+        sample.write(compressed(whole, compression, [&](std::size_t chunk, std::string& content) {
+            if (chunk == 2) wrong[i](content);
+        }));
+        const auto [rest, named] = items_of(sample.path);
+        CHECK(rest.size() < all.size());
+        CHECK(rest.size() > all.size() / 4);
+        CHECK(named.size() == 1);
+        auto next = all.begin();
+        for (const ItemSeen& item : rest) {
+            next = std::find(next, all.end(), item);
+            REQUIRE(next != all.end());
+        }
+    }
+}
 
 TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory than they have") {
     const ReaderSample sample;

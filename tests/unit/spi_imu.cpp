@@ -451,6 +451,13 @@ TEST_CASE("spi_imu: edges that did not come are missing samples, as the period s
     REQUIRE(world.step(world.now + 100 * us));
     CHECK(world.sample.number == (later + 500 * us) / ms);
     CHECK(((world.sample.flags & wire::imu_overrun) != 0) == (world.sample.number > 1));
+    // Beside one that came and was not read.
+    const std::uint32_t before = world.sample.number;
+    world.edge(world.now += ms);
+    world.edge(world.now += 2 * ms);
+    world.bus.run(world.now);
+    REQUIRE(world.step(world.now + 100 * us));
+    CHECK(world.sample.number == before + 3);
 }
 
 TEST_CASE("spi_imu: how many edges were lost follows from the period, unless more are known") {

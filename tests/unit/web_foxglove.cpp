@@ -87,6 +87,58 @@ TEST_CASE("web_foxglove: what was subscribed comes, and what was overwritten is 
     CHECK(viewed.take().empty());
 }
 
+TEST_CASE("web_foxglove: samples that have waited for a second are passed over, and counted") {
+    Viewed viewed;
+    viewed.subscribe();
+    const Duration old = GENERATE(Duration{}, seconds(3600));  // played again
+    const auto publish = [&](std::int64_t number, HostTime at) {
+        ImuMetadata sample{};
+        sample.host_time = at - old;
+        viewed.imu.publish({number}, pack(sample));
+    };
+    publish(0, viewed.now);
+    CHECK(viewed.take() == std::vector<std::int64_t>{0});
+    for (std::int64_t number = 1; number <= 50; ++number)
+        publish(number, viewed.now + milliseconds(100) * number);
+    viewed.now = viewed.now + milliseconds(100) * 50;
+    CHECK(viewed.take() == std::vector<std::int64_t>{50});
+    viewed.now = viewed.now + seconds(6);
+    CHECK_THAT(viewed.next_text()["message"].get<std::string>(),
+               Catch::StartsWith("/imu0/data_raw: 49 messages were not sent"));
+}
+
+TEST_CASE("web_foxglove: samples do not wait for images, nor images forever for samples") {
+    Viewed viewed;
+    auto frames = *ring::Writer::create(viewed.directory.path(),
+                                        {"cam0", ring::StreamKind::frames, 8, 8, 4096});
+    for (auto text = viewed.next_text(); !text.is_null(); text = viewed.next_text())
+        if (text["op"] == "advertise")
+            for (const auto& channel : text["channels"])
+                if (channel["topic"] == "/imu0/data_raw" || channel["topic"] == "/cam0/image_raw")
+                    viewed.session.receive(nlohmann::json{
+                        {"op", "subscribe"},
+                        {"subscriptions",
+                         {{{"id", channel["topic"] == "/imu0/data_raw" ? 1 : 2},
+                           {"channelId",
+                            channel["id"]}}}}}.dump());
+    const auto publish_frame = [&] { frames.publish(*frames.acquire(), 1, {}, {}); };
+    const auto next_id = [&] { return viewed.session.next_message(viewed.now).value()[1]; };
+    publish_frame();
+    viewed.publish(1);
+    viewed.publish(2);
+    CHECK(next_id() == 1);
+    CHECK(next_id() == 1);
+    CHECK(next_id() == 2);
+    publish_frame();
+    unsigned before = 0;
+    for (;; ++before) {
+        viewed.publish(3 + before);
+        if (next_id() == 2) break;
+        REQUIRE(before < 1000);
+    }
+    CHECK(before == 64);
+}
+
 TEST_CASE("web_foxglove: sentences of a receiver, and the lens of a camera") {
     constexpr auto camchain =
         "cam0: {camera_model: pinhole, intrinsics: [300.0, 301.0, 160.0, 120.0], resolution: [320, "

@@ -21,6 +21,9 @@ constexpr Duration after_life = seconds(10);
 constexpr Duration reading_apart = milliseconds(2'500);
 constexpr double slewed = 500e-6;
 
+/// A reading of the output clock on a busy host, by which a stamp was made that claims no accuracy.
+constexpr Duration reading_error = microseconds(100);
+
 /// So close to a whole number of seconds is no accident.
 constexpr Duration near_second = milliseconds(10);
 
@@ -203,9 +206,10 @@ void ClockWitness::judge_output(const StampTimes& stamp, VerdictBuilder& verdict
 
 void ClockWitness::judge_by_host_clock(const StampTimes& stamp, VerdictBuilder& verdict) const {
     const auto off = off_host_clock(stamp);
+    const bool claims_none = stamp.sigma_ns == sigma_unknown;
     if (!off)
         verdict.add(Finding::no_output_reading);
-    else if (!within_error(*off, stamp))
+    else if (!within_error(*off, stamp) && !(claims_none && absolute(*off) <= reading_error))
         verdict.add(output_finding(*off), *off);
 }
 

@@ -72,7 +72,7 @@ struct FindingSpan {
     Duration worst;  ///< by amount; 0: it has none
 };
 
-/// The second with the most items of the worst grade, and the finding about them.
+/// Of the worst grade, the second and the finding with the most items.
 struct WorstSecond {
     Finding finding{};
     std::int64_t second = 0;

@@ -40,6 +40,9 @@ constexpr std::uint16_t while_running = 0xFFFF;
 /// The fastest that parts on I2C share with cables of a few decimetres. If lower, 1 kHz does not
 /// fit; if higher, most pull-ups are too weak.
 constexpr std::uint32_t i2c_clock_hz = 400'000;
+/// Edges since the last sample, of which some may not have come. Over more, a part whose rate is
+/// off by 12 % would seem to have skipped one.
+constexpr std::uint32_t few_edges = 4;
 constexpr std::uint8_t i2c_address = 0x68;  ///< the second is the next one
 constexpr std::uint8_t reads = 0x80;        ///< of a register's address on the SPI bus
 
@@ -202,7 +205,7 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
     const bool after_another = served_at_ != began_;
-    if (edges_lost_ || (after_another && due == 1)) {
+    if (edges_lost_ || (after_another && due <= few_edges)) {
         // How many there were follows from the part's period: some may not have come.
         const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);

@@ -25,9 +25,11 @@ enum class Promptness : std::uint8_t {
 constexpr Duration usual_delay_tolerance = microseconds(100);
 
 /// Two accounts of an instant are `apart`: how far a usual delay may then be off the shortest. The
-/// further they are apart, the less precise a clock tells them apart.
+/// further they are apart, the less precise a clock tells them apart. If it were a quarter,
+/// messages that wait for as long as that would seem usual as often as early after a step of the
+/// clock.
 inline Duration tolerance_between(Duration apart) {
-    return std::max(usual_delay_tolerance, absolute(apart) / 4);
+    return std::max(usual_delay_tolerance, absolute(apart) / 8);
 }
 
 /// Two accounts of an instant are `apart`: the delay of the message shows that its own is right.
