@@ -21,7 +21,8 @@ std::vector<int> blocked_signals() {
 
 }  // namespace
 
-TEST_CASE("thread: has its name and takes no signal, and its maker takes those that it did") {
+TEST_CASE("thread: has its name and takes no signal, and its maker takes those that it did",
+          "[kernel]") {
     const std::vector<int> before = blocked_signals();
     std::vector<int> inside;
     char name[16]{};

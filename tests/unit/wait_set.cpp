@@ -176,7 +176,7 @@ TEST_CASE_METHOD(WaitStreams, "wait_set: a dead writer is news once, though its 
 }
 
 TEST_CASE_METHOD(TwoStreams, "wait_set: its descriptor is readable until nothing is left [threads]",
-                 "[threads]") {
+                 "[threads][kernel]") {
     const auto descriptor = set.fd();
     REQUIRE(descriptor);
     CHECK(readable(*descriptor));
@@ -251,7 +251,8 @@ TEST_CASE_METHOD(WaitStreams, "wait_set: any time is a time to wait [threads]", 
 }
 
 TEST_CASE_METHOD(WaitStreams,
-                 "wait_set: a writer on another clock is no news while its heart beats") {
+                 "wait_set: a writer on another clock is no news while its heart beats",
+                 "[kernel]") {
     Writer writing = writer("a");
     Reader reading = reader("a");
     const HostTime far = host_now() - seconds(1000);

@@ -217,7 +217,8 @@ TEST_CASE_METHOD(Memory, "writer: without history, who comes late loses all but 
     CHECK(lost == count - newest_kept);
 }
 
-TEST_CASE_METHOD(Memory, "writer: large rings have huge pages, if the kernel gives them") {
+TEST_CASE_METHOD(Memory, "writer: large rings have huge pages, if the kernel gives them",
+                 "[kernel]") {
     constexpr std::uint64_t slot = 3 << 20U;
     const bool sealed = GENERATE(false, true);
     const auto writer =
@@ -253,7 +254,7 @@ TEST_CASE_METHOD(Memory, "writer: the group may read its file, whatever the umas
     CHECK((file.st_mode & 07777U) == 0640U);
 }
 
-TEST_CASE_METHOD(Memory, "writer: its memory is at hand before the first payload") {
+TEST_CASE_METHOD(Memory, "writer: its memory is at hand before the first payload", "[kernel]") {
     const bool sealed = GENERATE(false, true);
     Writer writer = *Writer::create({directory.path(), sealed}, frames);
     std::byte* data = writer.slot_data(0);
@@ -325,14 +326,15 @@ TEST_CASE_METHOD(Memory, "writer: a sealed one without a thread is not made") {
     CHECK_THAT(refusal(events, true), Contains("cannot start a thread"));
 }
 
-TEST_CASE_METHOD(Memory, "writer: where nothing can be sealed, it says what to do") {
+TEST_CASE_METHOD(Memory, "writer: where nothing can be sealed, it says what to do", "[kernel]") {
     CHECK(in_process([&] {
         return test::refuse(SYS_fcntl, EINVAL, F_ADD_SEALS) &&
                refuses(events, true, "cannot be sealed: Invalid argument; set 'sealed = false'");
     }));
 }
 
-TEST_CASE_METHOD(Memory, "writer: a sealed one is no program, unless Linux is too old for that") {
+TEST_CASE_METHOD(Memory, "writer: a sealed one is no program, unless Linux is too old for that",
+                 "[kernel]") {
     constexpr unsigned no_program = 0x8;  // MFD_NOEXEC_SEAL
     const auto executable = [&] {
         const auto writer = Writer::create({directory.path(), true}, events);
@@ -381,7 +383,7 @@ TEST_CASE_METHOD(Memory, "writer: only what the dead have left gives way to a ne
     }));
 }
 
-TEST_CASE_METHOD(Memory, "writer: a ring whose successor gets no name goes on") {
+TEST_CASE_METHOD(Memory, "writer: a ring whose successor gets no name goes on", "[kernel]") {
     std::filesystem::create_directory(path("taken"));
     CHECK_THAT(Writer::create(directory.path(), {"taken", StreamKind::events, 8}).error().message(),
                Contains("cannot be renamed into place: Is a directory"));

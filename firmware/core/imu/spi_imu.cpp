@@ -81,6 +81,7 @@ void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds 
     const std::uint32_t rate = part_rate(*part_, configuration);
     part_->setup({rate, configuration.filter, has(wire::imu_accel_ready)}, setup_);
     period_ = mhz_ns / rate;
+    late_after_ = period_ + period_ / 2;
     ready_edges_.configure(period_);
     accel_period_ = part_->accel_millihertz() == 0 ? 0 : mhz_ns / part_->accel_millihertz();
     accel_edges_.configure(accel_period_);
@@ -204,10 +205,9 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
         return drop(wire::BoardEventKind::imu_failed, now);
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
-    const bool after_another = served_at_ != began_;
-    if (edges_lost_ || (after_another && due <= few_edges)) {
+    const Nanoseconds since = sample.time_ns - served_at_;
+    if (since >= late_after_ && (edges_lost_ || (served_at_ != began_ && due <= few_edges))) {
         // How many there were follows from the part's period: some may not have come.
-        const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
         due = periods > due ? periods : due;
     }
