@@ -40,9 +40,6 @@ constexpr std::uint16_t while_running = 0xFFFF;
 /// The fastest that parts on I2C share with cables of a few decimetres. If lower, 1 kHz does not
 /// fit; if higher, most pull-ups are too weak.
 constexpr std::uint32_t i2c_clock_hz = 400'000;
-/// Edges since the last sample, of which some may not have come. Over more, a part whose rate is
-/// off by 12 % would seem to have skipped one.
-constexpr std::uint32_t few_edges = 4;
 constexpr std::uint8_t i2c_address = 0x68;  ///< the second is the next one
 constexpr std::uint8_t reads = 0x80;        ///< of a register's address on the SPI bus
 
@@ -81,7 +78,6 @@ void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds 
     const std::uint32_t rate = part_rate(*part_, configuration);
     part_->setup({rate, configuration.filter, has(wire::imu_accel_ready)}, setup_);
     period_ = mhz_ns / rate;
-    late_after_ = period_ + period_ / 2;
     ready_edges_.configure(period_);
     accel_period_ = part_->accel_millihertz() == 0 ? 0 : mhz_ns / part_->accel_millihertz();
     accel_edges_.configure(accel_period_);
@@ -205,9 +201,9 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
         return drop(wire::BoardEventKind::imu_failed, now);
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
-    const Nanoseconds since = sample.time_ns - served_at_;
-    if (since >= late_after_ && (edges_lost_ || (served_at_ != began_ && due <= few_edges))) {
-        // How many there were follows from the part's period: some may not have come.
+    if (edges_lost_) {
+        // How many there were follows from the part's period.
+        const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
         due = periods > due ? periods : due;
     }

@@ -76,11 +76,10 @@ class SpiImu final : public ImuPort {
     Grid grid_;                 ///< unless the part paces the samples
     Nanoseconds patience_ = 0;  ///< how long its data-ready edge may fail to come
     Job job_state_ = Job::none;
-    bool job_reads_ = false;      ///< its transfers are those that begin a sample
-    Nanoseconds job_until_ = 0;   ///< when it must have ended; never: it waits for an edge
-    unsigned readings_ = 0;       ///< of the sample that is being read
-    Nanoseconds period_ = 0;      ///< of the edges, as configured in the part
-    Nanoseconds late_after_ = 0;  ///< an edge: one more was due. Kept, as division is slow
+    bool job_reads_ = false;     ///< its transfers are those that begin a sample
+    Nanoseconds job_until_ = 0;  ///< when it must have ended; never: it waits for an edge
+    unsigned readings_ = 0;      ///< of the sample that is being read
+    Nanoseconds period_ = 0;     ///< of the edges, as configured in the part
     Nanoseconds accel_period_ = 0;
     unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed
