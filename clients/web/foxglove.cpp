@@ -210,29 +210,25 @@ std::optional<std::string> FoxgloveSession::next_text(HostTime now) {
 
 namespace {
 
-/// What has waited for so much longer than others of its stream is passed over if something newer
-/// has come. What is played again is as old as it was recorded.
-constexpr Duration stale_after = seconds(1);
+/// A subscription that has not caught up for so long goes on with the newest item.
+constexpr Duration longest_behind = seconds(1);
 
 /// Small messages in a row, after which an image goes first: a connection too slow for all of them
 /// would show none.
 constexpr unsigned most_in_a_row = 64;
 
-HostTime came(const ImuMetadata& sample) { return sample.host_time; }
-HostTime came(const FrameMetadata& frame) { return frame.arrival; }
-
-/// The next item that is not stale, or the newest.
+/// The next item, or the newest.
 template <class Stream, class Subscription>
 auto next_fresh(Stream& stream, HostTime now, Subscription& subscription) {
+    if (!subscription.caught_up) subscription.caught_up = now;
     auto item = stream.next();
     if (!item) {
         subscription.missed += item.error().lost;
-        if (item.error().why == ring::Pause::restarted) subscription.least_age.reset();
+        if (item.error().why != ring::Pause::lost) subscription.caught_up = now;
         return item;
     }
-    const Duration age = now - came(item->data);
-    subscription.least_age = std::min(subscription.least_age.value_or(age), age);
-    if (age - *subscription.least_age <= stale_after) return item;
+    if (now - *subscription.caught_up <= longest_behind) return item;
+    subscription.caught_up = now;
     auto newest = stream.latest();
     if (!newest) return item;
     subscription.missed += newest->number - item->number;

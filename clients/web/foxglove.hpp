@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Foxglove's WebSocket protocol, for Foxglove and Lichtblick: what a viewer subscribes to, and the
-// messages for it, without the connection. What is small goes first. Images are the newest when the
-// connection can take one; samples and stamps that have waited for a second are passed over. What a
+// messages for it, without the connection. Small messages go before images. Images are the newest
+// when the connection can take one; samples and stamps fall behind by a second at most. What a
 // viewer misses is counted, and it is shown that. Used by one thread.
 #pragma once
 
@@ -53,7 +53,7 @@ class FoxgloveSession {
         std::uint64_t version = 0;  ///< of the JPEG
         std::string problem{};      ///< why there is none, or what is wrong, as it was reported
         std::uint64_t missed = 0;
-        std::optional<Duration> least_age{};  ///< of its items, when they were read
+        std::optional<HostTime> caught_up{};  ///< when nothing newer was left the last time
     };
 
     void look_for_channels();

@@ -120,12 +120,12 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     if (std::exchange(clock_life_, contact.life) != contact.life) delays_.forget();
     const auto arrival = arrival_delay(departed, received, translator_);
     const auto impossible = arrival ? arrival->doubt : std::nullopt;
-    // Also those that are impossible: the others alone would seem to be as prompt as usual.
-    // After those from the future, one that was held up does not fit because the pace may have
-    // wandered: it is one of them.
-    const bool ahead = step_possible_.mostly_early() && pulse_filter_.confirmed();
+    // Among samples from the future, one that was delayed is possible. It must not pass because the
+    // pace may have wandered since.
+    const bool ahead = from_future_.mostly_early() && pulse_filter_.confirmed();
     const PulseHistory& believed = pulse_filter_.believed();
     const auto misfit = ahead ? believed.doubt_at_pace(pulse) : believed.doubt(pulse);
+    // Also those that are impossible: the others alone would seem to be as prompt as usual.
     translator_.heard(departures_, {departed, received}, !misfit);
     translator_.heard(samples_, {pulse.at, received}, !misfit);
     const auto doubt =
@@ -138,7 +138,7 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     if (doubt) {
         step_promptness_.doubted(promptness);
         const bool not_yet = impossible && impossible->reason == EventReason::not_yet;
-        step_possible_.doubted(not_yet ? Promptness::early : Promptness::usual);
+        from_future_.doubted(not_yet ? Promptness::early : Promptness::usual);
         if (!arrival || impossible || contact.contradicted ||
             !may_adopt(promptness, *doubt, contact.exchanges))
             return doubt;
@@ -153,7 +153,7 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
         translator_.clock_continues();
     }
     step_promptness_.believed();
-    step_possible_.believed();
+    from_future_.believed();
     if (arrival) delays_.learn(arrival->delay, received);
     believed_life_ = clock_life_;
     return std::nullopt;
@@ -172,7 +172,7 @@ bool ImuPipeline::may_adopt(Promptness promptness, const Implausibility& doubt,
     if (clock_life_ != believed_life_) return pulse_filter_.stepped(exchanges);
     const auto samples = translator_.confirms_others(samples_);
     const auto departures = translator_.confirms_others(departures_);
-    if (step_possible_.mostly_early()) return false;  // however long they agree
+    if (from_future_.mostly_early()) return false;  // however long they agree
     // Early though exchanges confirm them: the clock stepped, and the estimate does not know yet.
     const bool early = step_promptness_.mostly_early();
     if (samples && departures)

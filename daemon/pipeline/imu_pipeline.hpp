@@ -87,7 +87,7 @@ class ImuPipeline {
     MajorityFilter<PulseHistory> pulse_filter_;
     DelayFloor delays_;  ///< of samples, from their departure
     StepPromptness step_promptness_;
-    StepPromptness step_possible_;  ///< early: before it was sent, as far as the clock is known
+    StepPromptness from_future_;  ///< early: they arrived before the instant that they name
     std::uint32_t clock_life_ = 0;
     std::uint32_t believed_life_ = 0;  ///< of the clock, when a sample was believed last
     StampGuard guard_;

@@ -69,10 +69,7 @@ bool forbid_waiting_for_any(unsigned error) {
 }  // namespace
 
 TEST_CASE_METHOD(FutexWords, "futex: a wait without news lasts as long as was asked") {
-    if (!test::kernel_waits_for_any()) {
-        WARN("not tested: this kernel cannot wait for several words");
-        return;
-    }
+    if (!test::kernel_waits_for_any()) return;
     using std::chrono::milliseconds;
     for (const std::size_t count : {0, 1, 2, 128, 200})
         for (const milliseconds span : {milliseconds(1), milliseconds(30)})
@@ -84,10 +81,7 @@ TEST_CASE_METHOD(FutexWords, "futex: a wait without news lasts as long as was as
 
 TEST_CASE_METHOD(FutexWords, "futex: each of several words wakes who waits for all [threads]",
                  "[threads]") {
-    if (!test::kernel_waits_for_any()) {
-        WARN("not tested: this kernel cannot wait for several words");
-        return;
-    }
+    if (!test::kernel_waits_for_any()) return;
     for (const std::size_t count : {1, 3, 128})
         for (const std::size_t one : {std::size_t{0}, count / 2, count - 1}) {
             std::thread waiting([&] { futex_wait_any(first(count), seconds(60).ns); });

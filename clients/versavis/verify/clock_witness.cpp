@@ -21,7 +21,8 @@ constexpr Duration after_life = seconds(10);
 constexpr Duration reading_apart = milliseconds(2'500);
 constexpr double slewed = 500e-6;
 
-/// A reading of the output clock on a busy host, by which a stamp was made that claims no accuracy.
+/// By how much a reading of the output clock may be off on a busy host. Stamps by arrival, which
+/// claim no accuracy, are made with one.
 constexpr Duration reading_error = microseconds(100);
 
 /// So close to a whole number of seconds is no accident.
@@ -35,7 +36,7 @@ bool whole_seconds(Duration off) {
            std::min(rest, seconds(1).ns - rest) < near_second.ns;
 }
 
-/// One that was held so that time does not go back is late.
+/// A stamp that was held back so that time does not step backwards may be late by any amount.
 bool within_error(Duration off, const StampTimes& stamp) {
     const bool held = (stamp.flags & flag_clamped) != 0;
     return absolute(off) <= allowed_error(stamp.sigma_ns) || (held && off.ns > 0);

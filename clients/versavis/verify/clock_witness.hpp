@@ -33,7 +33,8 @@ class ClockWitness {
     /// Adds what contradicts the times, or what is missing to prove them.
     void judge(const StampTimes& stamp, VerdictBuilder& verdict) const;
 
-    /// The same of one that is not the board's: the output clock alone was recorded beside it.
+    /// The same for a stamp that is not by the board's clock: it is held against the readings of
+    /// the output clock alone.
     void judge_by_host_clock(const StampTimes& stamp, VerdictBuilder& verdict) const;
 
     /// The boot of the board that was running at `host`; null: none is recorded.

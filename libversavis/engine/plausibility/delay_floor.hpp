@@ -24,10 +24,9 @@ enum class Promptness : std::uint8_t {
 /// which there is as much at most.
 constexpr Duration usual_delay_tolerance = microseconds(100);
 
-/// Two accounts of an instant are `apart`: how far a usual delay may then be off the shortest. The
-/// further they are apart, the less precise a clock tells them apart. If it were a quarter,
-/// messages that wait for as long as that would seem usual as often as early after a step of the
-/// clock.
+/// Two accounts of an instant are `apart`: how far a usual delay may then be off the shortest. A
+/// larger difference needs a less precise clock. If it were a quarter, a step of the clock on a
+/// link with long delays would make as many delays usual as early.
 inline Duration tolerance_between(Duration apart) {
     return std::max(usual_delay_tolerance, absolute(apart) / 8);
 }
