@@ -77,6 +77,26 @@ TEST_CASE("delay_floor: only what is larger than its tolerance is confirmed by a
         CHECK_FALSE(arrival_confirms(other, seconds(1)));
 }
 
+TEST_CASE("delay_floor: after a step of the clock, more delays seem early than usual") {
+    DelayBench bench;
+    bench.learn(20, microseconds(300));
+    for (const Duration step : {microseconds(800), milliseconds(5), milliseconds(50)}) {
+        const Duration tolerance = tolerance_between(step);
+        const Duration sigma = tolerance / 3;  // were it worse, none would be usual
+        int early = 0;
+        int usual = 0;
+        // They wait for anything up to twice the step, as on a link with long delays.
+        for (int i = 0; i < 200; ++i) {
+            const Duration delay = microseconds(300) + step * i / 100 - step;
+            const Promptness promptness = bench.floor.of(delay, sigma, tolerance);
+            early += promptness == Promptness::early ? 1 : 0;
+            usual += promptness == Promptness::usual ? 1 : 0;
+        }
+        CHECK(usual > 0);
+        CHECK(early > usual);
+    }
+}
+
 TEST_CASE("delay_floor: what most of them say counts for a step, and those late say nothing") {
     StepPromptness promptness;
     CHECK_FALSE(promptness.mostly_early());
