@@ -221,6 +221,31 @@ def shared_pins(table: Table) -> list[str]:
             {"trigger", "exposure"} & set(connector["pins"].values())]
 
 
+# Words of the table's pins by the carrier's nets; other nets as they are called there.
+PIN_WORDS = {"GND": "ground", "5V_OUT": "5 V", "+3V3": "3.3 V", "READY1_IN": "ready1"}
+PIN_ENDS = (("_TRIGGER", "trigger"), ("_EXPOSURE", "exposure"), ("_PPS", "pps"),
+            ("_SERIAL", "serial"))
+
+
+def pin_word(net: str) -> str:
+    if net.startswith("VCAM"):
+        return "supply"
+    ends = [word for end, word in PIN_ENDS if net.endswith(end)]
+    return ends[0] if ends else PIN_WORDS.get(net, net.lower().removesuffix("_x"))
+
+
+def connector_faults(table: Table) -> list[str]:
+    """The table's pins are the carrier's."""
+    faults = []
+    for name, connector in table["connectors"].items():
+        for label in connector["board"]:
+            part = next(part for part in BOARD.parts.values() if part.label == label)
+            there = {number: pin_word(net) for number, net in part.nets.items() if number != "MP"}
+            if connector["pins"] != there:
+                faults.append(f"{name}: its pins are not those of {label}")
+    return faults
+
+
 def lidar_faults(row: Table, wiring: Table) -> list[str]:
     lidar = wiring[row["name"]]
     return [f"{line}: {fault}" for line in ("pulse", "serial")
@@ -243,7 +268,7 @@ def other_faults(row: Table, table: Table) -> list[str]:
 
 def faults(table: Table, wiring: Table) -> list[str]:
     """Of tables()."""
-    found = shared_pins(table)
+    found = shared_pins(table) + connector_faults(table)
     for row in table["cameras"]:
         into, output = camera_facts(row, wiring)
         found += [f"{row['name']}: {fault}" for fault in

@@ -6,7 +6,7 @@ import pathlib
 import re
 
 import catalogue as c
-from catalogue import capacitor, gh, jumper, resistor
+from catalogue import capacitor, gh, jumper, micro_fit, resistor
 from model import Board, Component, Mark, Rail
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -16,6 +16,7 @@ ISOLATED = (2, 3)  # channels that can be populated for 24 V
 LEVELS = {"1.8 V": "+1V8", "3.3 V": "+3V3", "5 V": "+5V"}
 LEVEL_MARKS = (("1.8", -2.54, 2.0, 0), ("3.3", 2.54, 2.0, 0), ("5V", 2.1, -2.54, 0),
                ("LVL", -2.3, -2.54, 0))
+PWR_MARKS = (("V0", -1.9, 3.0, 0), ("V3", 10.9, 3.0, 0), ("GND", -2.5, 1.65, 0))
 INVERT_MARKS = (("P", -1.8, 0.0, 0), ("S", -1.8, 2.54, 0))
 SHARED = ("i2c_data", "i2c_clock")  # pins that SPI names
 
@@ -55,7 +56,7 @@ def supply(board: Board) -> None:
     disconnects above 30 V; meanwhile USB keeps the Pico alive."""
     board.sheet("power", "Supply: 7 to 24 V or USB")
     g = "power"
-    board.add("J1", c.MICRO_FIT, g, marks=(("GND", -4.2, -1.5, 0), ("7-24V", 7.2, -2.5, 0)),
+    board.add("J1", micro_fit(2), g, marks=(("GND", -4.2, -1.5, 0), ("7-24V", 7.2, -2.5, 0)),
               _1="GND", _2="VIN")
     board.add("D1", c.TVS, g, near="J1.2", _1="VIN", _2="GND")
     board.add("U2", c.EFUSE, g, IN="VIN", UVLO="UVLO", OVP="OVP", MODE="RTN", RTN="RTN", EP="RTN",
@@ -161,32 +162,33 @@ def camera(board: Board, n: int) -> None:
 
 
 def camera_supply(board: Board) -> None:
-    """Each camera's own fuse; a connector of its own, never a pin beside a signal."""
+    """Each camera's own fuse; a connector of its own, of a family that no signal has. Supplies are
+    in the row towards the fuses, with ground at the pin of the other row."""
     board.sheet("camera_supply", "Supply of the cameras")
     g = "camera_supply"
-    for pair, ref in ((0, "J120"), (2, "J121")):
-        first, second = f"VCAM{pair}", f"VCAM{pair + 1}"
-        board.add(ref, gh(4), g, label=f"PWR{pair}{pair + 1}", _1=first, _2="GND", _3=second,
-                  _4="GND", MP="GND")
+    board.add("J120", micro_fit(CAMERAS, 2), g, label="PWR", marks=PWR_MARKS, named={
+        **{str(n + 1): "GND" for n in range(CAMERAS)},
+        **{str(CAMERAS + n + 1): f"VCAM{n}" for n in range(CAMERAS)}})
     for n in range(CAMERAS):
-        connector, pin = ("J120", "J121")[n // 2], (1, 3)[n % 2]
-        board.add(f"F{n + 1}", c.PTC300, g, near=f"{connector}.{pin}", _1="VPROT", _2=f"VCAM{n}")
+        board.add(f"F{n + 1}", c.PTC300, g, near=f"J120.{CAMERAS + n + 1}", _1="VPROT",
+                  _2=f"VCAM{n}")
 
 
 def isolated(board: Board, n: int) -> None:
-    """24 V, isolated, supplied by the camera's side (18 to 30 V): a populated option."""
+    """24 V, isolated, supplied by the camera's side (18 to 30 V): a populated option. The plug
+    brings these volts: it has more pins than any other of its family, and enters none of them."""
     if n == ISOLATED[0]:
         board.sheet("isolated", "Isolated 24 V, option of channels 2 and 3")
     g, b, fitted = f"isolated{n}", 1000 + 100 * n, ("isolated",)
     ground, supplied, out, into = (f"GND_ISO{n}", f"5V_ISO{n}", f"ISO{n}_TRIGGER",
                                    f"ISO{n}_EXPOSURE")
     add = board.add
-    add(f"J{b}", gh(4), g, label=f"ISO{n} 24V", fitted=fitted, _1=f"24V_ISO{n}", _2=out, _3=into,
-        _4=ground, MP=ground)
+    add(f"J{b}", gh(10), g, label=f"ISO{n} 24V", fitted=fitted, MP=ground, named={
+        **{str(i): ground for i in range(2, 11)}, "1": f"24V_ISO{n}", "3": out, "5": into})
     add(f"U{b}", c.ISOLATOR, g, fitted=fitted, VCC1="+3V3", GND1="GND", OUTA=f"EXPOSURE{n}",
         INB=f"TRIGGER{n}", VCC2=supplied, GND2=ground, INA=f"ISO{n}_IN", OUTB=f"ISO{n}_DRIVE")
     add(f"C{b}", c.C100N, g, near=f"U{b}.1", fitted=fitted, _1="+3V3", _2="GND")
-    add(f"D{b}", c.ESD32, g, near=f"J{b}.2", fitted=fitted, IO1=out, IO2=into, GND=ground)
+    add(f"D{b}", c.ESD32, g, near=f"J{b}.4", fitted=fitted, IO1=out, IO2=into, GND=ground)
     add(f"C{b + 1}", c.C100N, g, near=f"U{b}.8", fitted=fitted, _1=supplied, _2=ground)
     add(f"D{b + 1}", c.ZENER, g, near=f"U{b}.8", fitted=fitted, K=supplied, A=ground)
     add(f"R{b}", resistor("2k7", "1206"), g, near=f"D{b + 1}.3", fitted=fitted,
@@ -205,9 +207,9 @@ def isolated(board: Board, n: int) -> None:
     add(f"R{b + 4}", resistor("10k", "0805"), g, near=f"Q{b + 1}.3", fitted=fitted, _1=out,
         _2=ground)
     # Exposure: an open collector, pulled up to 24 V, divided, clamped.
-    add(f"R{b + 5}", resistor("4k7", "1206"), g, near=f"J{b}.3", fitted=fitted,
+    add(f"R{b + 5}", resistor("4k7", "1206"), g, near=f"J{b}.5", fitted=fitted,
         _1=f"24V_ISO{n}", _2=into)
-    add(f"R{b + 6}", resistor("10k", "0805"), g, near=f"J{b}.3", fitted=fitted, _1=into,
+    add(f"R{b + 6}", resistor("10k", "0805"), g, near=f"J{b}.5", fitted=fitted, _1=into,
         _2=f"ISO{n}_IN")
     add(f"R{b + 7}", resistor("4k7"), g, near=f"U{b}.7", fitted=fitted, _1=f"ISO{n}_IN", _2=ground)
     add(f"D{b + 2}", c.CLAMP, g, near=f"U{b}.7", fitted=fitted, A=ground, K=supplied,
@@ -220,7 +222,8 @@ def lidar(board: Board, n: int) -> None:
         board.sheet("lidar", "LiDARs")
     g, b = f"lidar{n}", 600 + 20 * n
     level, pps, serial = f"LIDAR{n}_LEVEL", f"LIDAR{n}_PPS", f"LIDAR{n}_SERIAL"
-    board.add(f"J{b}", gh(4), g, label=f"LIDAR{n}", _1=pps, _2="GND", _3=serial, _4="GND", MP="GND")
+    board.add(f"J{b}", gh(5), g, label=f"LIDAR{n}", _1=pps, _2="GND", _3=serial, _4="GND", _5="GND",
+              MP="GND")
     board.add(f"D{b}", c.ESD24, g, near=f"J{b}.2", IO1=pps, IO2=serial, GND="GND")
     # Delivered at 3.3 V: 5 V destroys the inputs of a Livox.
     board.add(f"JP{b}", jumper(3), g, marks=ends("3.3", "5V", 90), delivered="3.3", _1="+3V3",
@@ -258,13 +261,14 @@ def pulses(board: Board) -> None:
     """PPS, NMEA, aux and sync."""
     board.sheet("pulses", "Pulses and NMEA")
     g = "gnss"
-    board.add("J700", gh(4), g, label="GNSS", _1="5V_OUT", _2="PPS_IN", _3="NMEA_IN", _4="GND",
-              MP="GND")
-    board.add("D700", c.ESD24, g, near="J700.2", IO1="PPS_IN", IO2="NMEA_IN", GND="GND")
+    # Pins as of the IMU's UART, so that either cable bears the other's place.
+    board.add("J700", gh(6), g, label="GNSS", _1="5V_OUT", _2="GND", _4="NMEA_IN", _5="PPS_IN",
+              _6="GND", MP="GND")
+    board.add("D700", c.ESD24, g, near="J700.4", IO1="PPS_IN", IO2="NMEA_IN", GND="GND")
     board.add("JP700", jumper(2), g, label="50 OHM", _1="PPS_IN", _2="PPS_50")
     board.add("R700", resistor("49R9", "1206"), g, near="JP700.2", _1="PPS_50", _2="GND")
-    slow_input(board, 702, g, "PPS_IN", "PPS_NODE", "J700.2")
-    slow_input(board, 704, g, "NMEA_IN", "NMEA_NODE", "J700.3", "+3V3")
+    slow_input(board, 702, g, "PPS_IN", "PPS_NODE", "J700.5")
+    slow_input(board, 704, g, "NMEA_IN", "NMEA_NODE", "J700.4", "+3V3")
     board.add("U700", c.SCHMITT2, g, near="D702.3", VCC="+3V3", GND="GND", named={
         "1A": "PPS_NODE", "1Y": "PPS", "2A": "NMEA_NODE", "2Y": "NMEA_CLEAN"})
     decouple(board, "C700", g, "U700.5", "+3V3")
@@ -279,31 +283,34 @@ def pulses(board: Board) -> None:
 
 def aux(board: Board) -> None:
     g = "aux"
-    board.add("J720", gh(4), g, label="AUX", _1="AUX0_IN", _2="GND", _3="AUX1_IN", _4="GND",
-              MP="GND")
-    board.add("D720", c.ESD24, g, near="J720.2", IO1="AUX0_IN", IO2="AUX1_IN", GND="GND")
+    for i in (0, 1):
+        board.add(f"J{720 + i}", gh(2), g, label=f"AUX{i}", _1=f"AUX{i}_IN", _2="GND", MP="GND")
+        board.add(f"D{720 + i}", c.ESD24, g, near=f"J{720 + i}.1", IO1=f"AUX{i}_IN", IO2="GND",
+                  GND="GND")
     slow_input(board, 722, g, "AUX0_IN", "AUX0_NODE", "J720.1")
-    slow_input(board, 724, g, "AUX1_IN", "AUX1_NODE", "J720.3")
+    slow_input(board, 724, g, "AUX1_IN", "AUX1_NODE", "J721.1")
     board.add("U720", c.SCHMITT2, g, near="D722.3", VCC="+3V3", GND="GND", named={
         "1A": "AUX0_NODE", "1Y": "AUX0", "2A": "AUX1_NODE", "2Y": "AUX1"})
     decouple(board, "C720", g, "U720.5", "+3V3")
 
 
 def sync(board: Board) -> None:
-    """Sync from and to another board, and the test output, with 5 V. The LED board is at TEST."""
+    """Sync from and to another board, and the test output, with 5 V. The LED board is at TEST. An
+    input's plug fits inputs only, an output's fits outputs."""
     g = "sync"
-    board.add("J740", gh(4), g, label="SYNC", _1="SYNC_OUT", _2="GND", _3="SYNC_IN", _4="GND",
-              MP="GND")
+    board.add("J740", gh(2), g, label="SYNC IN", _1="SYNC_IN", _2="GND", MP="GND")
+    board.add("J742", gh(3), g, label="SYNC OUT", _2="SYNC_OUT", _3="GND", MP="GND")
     board.add("J741", gh(3), g, label="TEST", _1="5V_OUT", _2="TEST_OUT", _3="GND", MP="GND")
-    board.add("D740", c.ESD24, g, near="J740.2", IO1="SYNC_OUT", IO2="SYNC_IN", GND="GND")
+    board.add("D740", c.ESD24, g, near="J740.1", IO1="SYNC_IN", IO2="GND", GND="GND")
+    board.add("D744", c.ESD24, g, near="J742.2", IO1="SYNC_OUT", IO2="GND", GND="GND")
     board.add("D741", c.ESD24, g, near="J741.2", IO1="TEST_OUT", IO2="GND", GND="GND")
     board.add("U740", c.T45_2, g, near="J741.1", VCCA="+3V3", GND="GND", DIR="+3V3", VCCB="+5V",
               A1="SYNC_OUTPUT", B1="SYNC_5V", A2="TEST_OUTPUT", B2="TEST_5V")
     decouple(board, "C740", g, "U740.1", "+3V3")
     decouple(board, "C741", g, "U740.8", "+5V")
-    board.add("R740", resistor("47R"), g, near="J740.1", _1="SYNC_5V", _2="SYNC_OUT")
+    board.add("R740", resistor("47R"), g, near="J742.2", _1="SYNC_5V", _2="SYNC_OUT")
     board.add("R741", resistor("47R"), g, near="J741.2", _1="TEST_5V", _2="TEST_OUT")
-    slow_input(board, 742, g, "SYNC_IN", "SYNC_NODE", "J740.3")
+    slow_input(board, 742, g, "SYNC_IN", "SYNC_NODE", "J740.1")
     board.add("U741", c.SCHMITT, g, near="D742.3", A="SYNC_NODE", GND="GND", Y="SYNC_INPUT",
               VCC="+3V3")
     decouple(board, "C742", g, "U741.5", "+3V3")
@@ -318,8 +325,8 @@ def light(board: Board) -> None:
     that R and C give."""
     board.sheet("light", "Light")
     g = "light"
-    board.add("J760", gh(4), g, label="LIGHT", _1="VLIGHT", _2="LIGHT_SINK", _3="LIGHT_5V",
-              _4="GND", MP="GND")
+    board.add("J760", micro_fit(4), g, label="LIGHT", _1="VLIGHT", _2="LIGHT_SINK", _3="LIGHT_5V",
+              _4="GND", marks=(("V", 0.0, 1.65, 0), ("GND", 9.0, 1.65, 0)))
     board.add("D760", c.ESD32, g, near="J760.2", IO1="LIGHT_SINK", IO2="LIGHT_5V", GND="GND")
     board.add("F6", c.PTC300, g, near="J760.1", _1="VPROT", _2="VLIGHT")
     board.add("Q760", c.MOSFET, g, near="J760.2", G="LIGHT_GATE", S="GND", D="LIGHT_SINK")
@@ -352,8 +359,8 @@ def imus(board: Board) -> None:
                         if pins[name.lower()] == names[shared]) for shared in SHARED)
     board.add("J800", gh(9), g, label="IMU SPI", _1="+3V3", _2="GND", MP="GND",
               named={str(i + 3): outside[name] for i, name in enumerate(spi)})
-    board.add("J801", gh(5), g, label="I2C", words={"3": "SCL", "4": "SDA"}, _1="+3V3", _2="GND",
-              _3=clock, _4=data, _5="IMU_READY0_X", MP="GND")
+    board.add("J801", gh(7), g, label="I2C", words={"3": "SCL", "4": "SDA"}, _1="+3V3", _2="GND",
+              _3=clock, _4=data, _5="IMU_READY0_X", _6="GND", _7="GND", MP="GND")
     board.add("D800", c.ESD5, g, near="J800.4", IO1=outside[spi[0]], GND="GND", IO2=outside[spi[1]],
               IO3=outside[spi[2]], IO4=outside[spi[3]])
     board.add("D801", c.ESD5, g, near="J800.7", IO1=outside[spi[4]], GND="GND", IO2=outside[spi[5]],

@@ -207,7 +207,8 @@ def gh(count: int) -> Component:
     return Component(f"GH {count}", f"JST-GH-{count}", pins(numbers + ", MP MP pas"),
                      f"SM{count:02}B-GHS-TB(LF)(SN)", "JST",
                      "JST GH series: 1.25 mm, locks, 1 A a contact, 50 V", (), 0.15 + 0.04 * count,
-                     "connector", (("amps", 1.0),), "connector")
+                     "connector", (("amps", 1.0),), "connector",
+                     (f"GHR-{count:02}V-S", "SSHL-002T-P0.2"))
 
 
 def jumper(columns: int, rows: int = 1) -> Component:
@@ -223,9 +224,20 @@ LEVEL = Component("level jumper", "HEADER-LEVEL", pins("1 1 pas, 2 2 pas, 3 3 pa
                   ("any pin header 2.54 mm",), 0.08, "jumper", (), "connector")
 SHUNT = Component("shunt 2.54 mm", "", (), "60900213421", "Würth", "shunt 2.54 mm",
                   ("any shunt 2.54 mm",), 0.03)
-MICRO_FIT = Component("Micro-Fit 2", "MICRO-FIT-2", TWO, "43650-0200", "Molex",
-                      "Molex 43650: 3 mm, locks, 5 A or more", ("436500200",), 0.60, "connector",
-                      (("amps", 5.0),), "connector")
+
+
+def micro_fit(columns: int, rows: int = 1) -> Component:
+    count = columns * rows
+    series, housing = ("43650", "43645") if rows == 1 else ("43045", "43025")
+    name = f"{columns}" if rows == 1 else f"{rows}x{columns}"
+    numbers = ", ".join(f"{i} {i} pas" for i in range(1, count + 1))
+    return Component(f"Micro-Fit {name}", f"MICRO-FIT-{name}", pins(numbers),
+                     f"{series}-{count:02}00", "Molex", f"Molex PS-{series}: 3 mm, locks, 5 A at "
+                     "most, fewer with more circuits and thinner wire", (f"{series}{count:02}00",),
+                     0.40 + 0.10 * count, "connector", (("amps", 5.0),), "connector",
+                     (f"{housing}-{count:02}00", "43030-0007"))
+
+
 HOLE = Component("M3", "HOLE-M3", (), "", "", "", (), 0.0, "hole", (), "none")
 TEST_POINT = Component("test point", "TEST-POINT", pins("1 1 pas"), "", "", "", (), 0.0,
                        "test_point", (), "connector")

@@ -2,6 +2,7 @@
 """Checks of the circuit that no program of KiCad makes. Each returns sentences, one a fault."""
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from typing import Iterator
 
@@ -9,7 +10,8 @@ from carrier import LEVELS, firmware_pins
 from model import Board, Part, Pin
 
 # Meant to be open: by board.
-OPEN = {"carrier": {("U2", "SHDN"), ("U1", "RUN"), ("U1", "VBUS"), ("U1", "GP18")},
+OPEN = {"carrier": {("U2", "SHDN"), ("U1", "RUN"), ("U1", "VBUS"), ("U1", "GP18"), ("J700", "3"),
+                    ("J742", "1")},
         "leds": {("U2", "Q6"), *(("U3", f"2Y{i}") for i in range(4))},
         "adis": {*(("J1", i) for i in ("7", "9")), *(("J2", i) for i in ("5", "15", "16"))}}
 DRIVERS = {"output", "power_out"}
@@ -361,6 +363,129 @@ def connectors(board: Board) -> list[str]:
             for net in part.nets.values() if net.startswith(SIGNAL_SUPPLY)]
 
 
+HIGH = 5.5  # V above which a supply destroys what is made for signals
+INPUT_BEARS = 24.0  # V that an input of the board takes for long
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact:
+    """What a pin of a connector is for: the board supplies, drives or listens, or neither. `volts`
+    is the most at each setting of a jumper."""
+    kind: str  # open, ground, supply, output, input
+    volts: tuple[float, ...] = ()
+
+
+def contact(board: Board, part: Part, pin: Pin) -> Contact:
+    net = part.nets.get(pin.number, "")
+    if not net or net.startswith("GND"):
+        return Contact("ground" if net else "open")
+    if net in board.rails:
+        return Contact("supply", (board.rails[net].most,))
+    for variant in sorted(part.fitted):
+        near = [net, *(far for far, ohm in across(board, net, variant) if ohm <= 1000)]
+        for other, to in (found for each in near for found in pins_on(board, each, variant)):
+            if to.kind == "open_collector":
+                return Contact("output", (line_volts(net),))
+            if driving(other, to) and to.supply:
+                return Contact("output", tuple(most for _, most in
+                                               levels_of(board, supply_net(other, to))))
+    return Contact("input", (INPUT_BEARS,))
+
+
+def plugs(board: Board) -> list[Part]:
+    return [part for part in board.parts.values() if part.component.family == "connector"]
+
+
+def contacts(board: Board, part: Part) -> dict[str, Contact]:
+    return {pin.number: contact(board, part, pin) for pin in part.component.pins
+            if pin.number != "MP"}
+
+
+def named(part: Part) -> str:
+    return part.label or part.ref
+
+
+def swaps(board: Board) -> list[str]:
+    """A plug that fits a connector of another use, too, destroys nothing there."""
+    faults = []
+    for part, other in itertools.permutations(plugs(board), 2):
+        if part.component.name != other.component.name:
+            continue
+        there = contacts(board, other)
+        for number, here in contacts(board, part).items():
+            fault = harm(here, there[number])
+            if fault:
+                faults.append(f"the plug of {named(part)} fits {named(other)}: at pin {number} "
+                              f"{fault}")
+    return faults
+
+
+def harm(meant: Contact, met: Contact) -> str:
+    """Of a cable that was made for one contact and meets another. What the board drives is a
+    device's input, and bears the least of what a jumper can set; where both connectors have the
+    same choice, it is the user's."""
+    if "open" in (meant.kind, met.kind) or meant == met:
+        return ""
+    if meant.kind == "ground":
+        return "ground meets what the board drives" if met.kind in ("supply", "output") else ""
+    if met.kind == "ground":
+        return "the device's output meets ground" if meant.kind == "input" else ""
+    if meant.kind == "input":
+        return "the device's output meets what the board drives"
+    if meant.kind == "supply" and met.kind == "output":
+        return "the device takes its supply from an output"
+    if max(met.volts) > min(meant.volts) and met.kind != "input":
+        return f"{max(met.volts):g} V meet what bears {min(meant.volts):g} V"
+    return ""
+
+
+def high_supplies(board: Board) -> list[str]:
+    """A supply above 5 V shares no type of connector with another use. What the board supplies
+    does not even share the family; what a plug brings has more pins than all others of the family,
+    so that this plug enters none of them, and its own connector is dead without it."""
+    faults = []
+    for part in plugs(board):
+        for net in dict.fromkeys(part.nets.values()):
+            if net not in board.rails or board.rails[net].most <= HIGH:
+                continue
+            says = f"{named(part)} has {net}, up to {board.rails[net].most:g} V"
+            for other in plugs(board):
+                same = contacts(board, other) == contacts(board, part)
+                if other.component.name == part.component.name and not same:
+                    faults.append(f"{says}, and the connector of {named(other)}")
+                if family(other) == family(part) and low(board, other):
+                    pins = len(part.component.pins)
+                    if fed_here(board, net):
+                        faults.append(f"{says}, and the family of {named(other)}")
+                    elif len(other.component.pins) >= pins:
+                        faults.append(f"{says}, and no more pins than {named(other)}")
+    return faults
+
+
+def family(part: Part) -> str:
+    return part.component.name.split()[0]
+
+
+def low(board: Board, part: Part) -> bool:
+    """True of a connector without a supply above 5 V."""
+    return all(board.rails[net].most <= HIGH for net in part.nets.values() if net in board.rails)
+
+
+def fed_here(board: Board, net: str) -> bool:
+    """True of a supply that comes from the board, not from what is plugged in."""
+    return any(pin.kind == "power_out" or part.component.family == "fuse"
+               for part, pin in board.pins_of(net))
+
+
+def contact_currents(board: Board) -> list[str]:
+    """Contacts bear what their rail may give."""
+    return [f"a contact of {named(part)} bears {part.component.figure('amps'):g} A, {net} may give "
+            f"{board.rails[net].milliamps / 1000:g}" for part in plugs(board)
+            for net in dict.fromkeys(part.nets.values())
+            if net in board.rails and
+            board.rails[net].milliamps > part.component.figure("amps") * 1000]
+
+
 def ratings(board: Board) -> list[str]:
     """Volts of capacitors and fuses, watts of resistors that may see a wrong 24 V."""
     faults = []
@@ -417,7 +542,7 @@ def decoupling(board: Board) -> list[str]:
 
 
 CIRCUIT = (unconnected, drivers, level_faults, pico_alone, rests, protection, supplies, pin_map,
-           isolation, connectors, ratings, decoupling)
+           isolation, connectors, swaps, high_supplies, contact_currents, ratings, decoupling)
 
 
 def circuit_faults(board: Board) -> list[str]:

@@ -110,13 +110,23 @@ def pico() -> Footprint:
                      kind="thru")
 
 
-def micro_fit() -> Footprint:
-    pads = (Pad("1", 0, 0, 1.5, 2.02, 1.02, "roundrect"), Pad("2", 3, 0, 1.5, 2.02, 1.02, "oval"),
-            Pad("", 1.5, -4.32, 3, 3, 3, "circle", plated=False))
-    body = (-3.325, -8.92, 6.325, 0.99)
-    return Footprint("MICRO-FIT-2", pads, (-3.82, -9.42, 6.82, 1.48), body, 6.2,
-                     "Connector_Molex:Molex_Micro-Fit_3.0_43650-0200_1x02_P3.00mm_Horizontal",
-                     kind="thru")
+def micro_fit(columns: int, rows: int = 1) -> Footprint:
+    """Molex Micro-Fit, from the side; the cable leaves upwards. Pegs hold it: one, or two from four
+    columns on."""
+    wide = 3.0 * (columns - 1)
+    tall, shape, side = (2.02, "oval", 3.325) if rows == 1 else (1.5, "circle", 3.575)
+    pads = [Pad(str(columns * row + column + 1), 3.0 * column, 3.0 * row, 1.5, tall, 1.02,
+                shape if row or column else "roundrect")
+            for row in range(rows) for column in range(columns)]
+    pads += [Pad("", wide / 2 + x, -4.32, 3, 3, 3, "circle", plated=False)
+             for x in ((0.0,) if columns < 4 else (-2.35, 2.35))]
+    body = (-side, -8.92, wide + side, 0.99)
+    count, series = columns * rows, "43650" if rows == 1 else "43045"
+    return Footprint(f"MICRO-FIT-{columns}" if rows == 1 else f"MICRO-FIT-{rows}x{columns}",
+                     tuple(pads), (-side - 0.495, -9.42, wide + side + 0.495,
+                                   1.48 if rows == 1 else 4.25), body, 6.2 if rows == 1 else 7.4,
+                     f"Connector_Molex:Molex_Micro-Fit_3.0_{series}-{count:02}00_{rows}x{columns:02}"
+                     "_P3.00mm_Horizontal", kind="thru")
 
 
 def hole(drill: float = 3.2) -> Footprint:
@@ -177,7 +187,8 @@ ALL = {footprint.name: footprint for footprint in (
              "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm", 1.75, turn=-90),
     two_rows("SOIC-16", 8, 2.475, 1.27, 1.95, 0.6, centred(3.9, 9.9),
              "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm", 1.75, turn=-90),
-    ribbon(8), sot23(), htssop16(), lga14(), inductor(), micro_fit(), pico(), hole(),
+    ribbon(8), sot23(), htssop16(), lga14(), inductor(), micro_fit(2), micro_fit(4),
+    micro_fit(4, 2), pico(), hole(),
     level_header(),
-    test_point(), *(gh(count) for count in (2, 3, 4, 5, 6, 8, 9, 10)),
+    test_point(), *(gh(count) for count in (2, 3, 4, 5, 6, 7, 9, 10)),
     header(1, 2), header(2, 1), header(3, 1), header(2, 2), header(3, 2), header(8, 2))}

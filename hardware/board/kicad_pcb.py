@@ -168,10 +168,15 @@ def outline(board: Board, home: str) -> list[tuple[float, float]]:
         x0, y0, x1, y1 = board.islands[home]
         return [(x0, y0), (x1 - MARGIN, y0), (x1 - MARGIN, y1), (x0, y1)]
     points = [(MARGIN, MARGIN), (width - MARGIN, MARGIN)]
+    g, low = ISOLATION + 0.2, -1.0
     for x0, y0, _, y1 in sorted(board.islands.values(), key=lambda box: box[1]):
-        g = ISOLATION + 0.2
-        points += [(width - MARGIN, y0 - g), (x0 - g, y0 - g), (x0 - g, y1 + g),
-                   (width - MARGIN, y1 + g)]
+        if y0 - g < low + 0.5:  # no copper fits between it and the one above
+            del points[-2:]
+            points += [(x0 - g, y1 + g), (width - MARGIN, y1 + g)]
+        else:
+            points += [(width - MARGIN, y0 - g), (x0 - g, y0 - g), (x0 - g, y1 + g),
+                       (width - MARGIN, y1 + g)]
+        low = y1 + g
     return [*points, (width - MARGIN, height - MARGIN), (MARGIN, height - MARGIN)]
 
 
@@ -335,6 +340,10 @@ def place_label(board: Board, part: Part, blocked: list[Box]) -> Label:
         inner = box_at((footprint.body[0], -4.0, footprint.body[2], -3.0), place)
         return ((inner[0] + inner[2]) / 2, (inner[1] + inner[3]) / 2,
                 90 if place.turn % 180 else 0, 0.9, part.label)
+    if footprint.name.startswith("MICRO"):
+        deep = footprint.courtyard[3]
+        inner = box_at((footprint.body[0], deep, footprint.body[2], deep + 1.2), place)
+        return (inner[0] + inner[2]) / 2, (inner[1] + inner[3]) / 2, 0, 0.9, part.label
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
     for size in (0.9, 0.7):
         w = label_width(part.label, size)

@@ -55,6 +55,13 @@ def rail(name: str, **figures: float) -> Change:
     return change
 
 
+def both(*changes: Change) -> Change:
+    def change(board: Board) -> None:
+        for each in changes:
+            each(board)
+    return change
+
+
 CIRCUIT: tuple[tuple[Check, str, Change], ...] = (
     (checks.unconnected, "U200: pin DIR is open",
      net("U200", "5", "")),
@@ -100,6 +107,24 @@ CIRCUIT: tuple[tuple[Check, str, Change], ...] = (
      net("J1200", "4", "GND")),
     (checks.connectors, "J200 has VCAM0 beside a camera's signal",
      net("J200", "4", "VCAM0")),
+    (checks.swaps, "CAM0 fits GNSS: at pin 1 ground meets what the board drives",
+     swap("J700", c.gh(4))),
+    (checks.swaps, "GNSS fits CAM0: at pin 1 the device takes its supply from an output",
+     both(swap("J700", c.gh(4)), net("J200", "1", "CAM0_TRIGGER"))),
+    (checks.swaps, "LIDAR0 fits I2C: at pin 1 3.4 V meet what bears 3.3 V",
+     both(swap("J801", c.gh(5)), rail("+1V8", most=3.3), net("J600", "1", "CAM0_TRIGGER"))),
+    (checks.swaps, "AUX0 fits SYNC IN: at pin 1 the device's output meets what the board drives",
+     net("J740", "1", "SYNC_OUT")),
+    (checks.swaps, "GNSS fits IMU UART: at pin 5 the device's output meets ground",
+     net("J820", "5", "GND")),
+    (checks.high_supplies, "PWR has VCAM0, up to 31.2 V, and the family of CAM0",
+     swap("J120", c.gh(8))),
+    (checks.high_supplies, "LIGHT has VLIGHT, up to 31.2 V, and the connector of CAM0",
+     swap("J760", c.gh(4))),
+    (checks.high_supplies, "ISO2 24V has 24V_ISO2, up to 30 V, and no more pins than IMU SPI",
+     swap("J1200", c.gh(8))),
+    (checks.contact_currents, "a contact of TEST bears 1 A, 5V_OUT may give 1.5",
+     rail("5V_OUT", milliamps=1500.0)),
     (checks.ratings, "C3 bears 25 V",
      swap("C3", c.C1U)),
     (checks.ratings, "R203 bears",
@@ -178,6 +203,8 @@ LAYOUT: tuple[tuple[Callable[..., list[str]], str, Callable[[Board, Layout], Non
      cut("EXPOSURE0")),
     (layout_checks.isolation_gap, "isolation needs 2",
      across_the_gap),
+    (layout_checks.isolation_gap, "GND_ISO2 and LIGHT_5V are",
+     on_layout(move("J760", 5.0, 2.0))),
     (layout_checks.holes, "are too near",
      a_hole_too_near),
 )
@@ -283,6 +310,7 @@ CABLES: tuple[tuple[str, Change], ...] = (
         "uart_in": 0.1, "ready1": 0.15})),
     ("vn100: serial is no pin of imu_uart", cable("vn100", wires={"serial": "RX"})),
     ("camera: supply and a signal are on one connector", supply_beside),
+    ("camera: its pins are not those of CAM0", supply_beside),
     ("flir of wiring.json has no cable", first_camera_lost),
 )
 

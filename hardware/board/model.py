@@ -69,6 +69,7 @@ class Component:
     family: str = ""
     figures: tuple[tuple[str, float], ...] = ()
     symbol: str = "box"
+    mates: tuple[str, ...] = ()  # of a connector: housing and contact of the cable
 
     def figure(self, name: str) -> float:
         return dict(self.figures)[name]

@@ -19,27 +19,32 @@ MOAT = 2.2  # mm around an isolated area
 Grid = numpy.ndarray[Any, Any]
 
 
-ISOLATED_AT = ((2, 20.5), (3, 39.0))  # middle of each isolated area, at the right edge
-ISLAND = (18.8, 7.6)  # its depth, and half of its height
+CAMERAS_AT = (18.5, 40.5, 67.0, 85.0)  # middle of their connectors, at the lower edge
+ISOLATED_AT = ((2, 20.5), (3, 39.5))  # middle of each isolated area, at the right edge
+ISLAND = (20.0, 8.4)  # its depth, and half of its height
 
 
 def hand(width: float, height: float) -> dict[str, Place]:
     top, bottom = 3.1, height - 3.1
     places = {
-        "U1": Place(26.0, 42.7, 90), "F5": Place(67.0, 21, 90), "F6": Place(89.0, 4.4, 0),
-        "F1": Place(27.5, 58.1, 90), "F2": Place(31.6, 58.1, 90), "F3": Place(64.5, 57.5, 90),
-        "F4": Place(68.6, 57.5, 90), "J1": Place(width - 9.5, 56.5, 270),
+        "U1": Place(26.0, 42.7, 90), "F5": Place(73.0, 26.4, 90), "F6": Place(89.0, 4.4, 0),
+        "F1": Place(59.9, 64.5, 270), "F2": Place(55.8, 64.5, 270), "F3": Place(51.7, 64.5, 270),
+        "F4": Place(47.6, 64.5, 270), "J1": Place(width - 9.5, 56.5, 270),
+        "J120": Place(58.25, height - 9.5, 180), "J760": Place(68.5, 9.5, 0),
+        "J820": Place(3.1, 13.0, 270), "J700": Place(3.1, 24.9, 270),
         "U2": Place(75.2, 53.5, 0), "U3": Place(66.5, 43.5, 90), "L1": Place(63.5, 35.5, 90),
-        "J800": Place(3.1, 63.4, 270), "U840": Place(9.0, height - 7.5, 0)}
+        "D2": Place(57.25, 38.75, 0),
+        "J800": Place(3.1, 63.4, 270), "U840": Place(9.0, height - 7.5, 0),
+        "D802": Place(29.5, height - 10.0, 0)}
     places |= {f"H{i + 1}": Place(x, y) for i, (x, y) in enumerate(
         (x, y) for y in (3.6, height - 3.6) for x in (3.6, width - 3.6))}
     places |= {ref: Place(x, bottom) for ref, x in (
-        ("J200", 19.0), ("J120", 29.5), ("J300", 40.0), ("J801", 51.0), ("J400", 62.0),
-        ("J121", 72.5), ("J500", 83.0))}
+        ("J200", CAMERAS_AT[0]), ("J801", 29.5), *((f"J{200 + 100 * n}", CAMERAS_AT[n])
+                                                  for n in (1, 2, 3)))}
     places |= {ref: Place(x, top, 180) for ref, x in (
-        ("J820", 13.0), ("J700", 23.8), ("J720", 33.4), ("J740", 43.0), ("J741", 52.0),
-        ("J600", 61.2), ("J620", 71.2), ("J760", 81.2))}
-    for n, x in enumerate((19.0, 40.0, 62.0, 83.0)):
+        ("J720", 10.3), ("J721", 17.2), ("J740", 24.1), ("J742", 31.7), ("J741", 39.9),
+        ("J600", 49.1), ("J620", 59.5))}
+    for n, x in enumerate(CAMERAS_AT):
         b = 200 + 100 * n
         places[f"JP{b}"] = Place(x, height - 15.0)
         places[f"JP{b + 1}"] = Place(x + (7.0 if n % 2 == 0 else -7.0), height - 18.4, 270)
@@ -52,19 +57,19 @@ def hand(width: float, height: float) -> dict[str, Place]:
 
 
 def jumpers_at_the_top() -> dict[str, Place]:
-    return {"JP820": Place(10.6, 25.8), "C13": Place(4.6, 29.6), "C12": Place(11.4, 29.6),
-            "JP700": Place(20.5, 28.2, 0), "JP701": Place(27.0, 28.2, 0),
-            "JP600": Place(49.8, 28.2, 0), "JP601": Place(59.6, 27.3, 0),
-            "JP620": Place(66.0, 28.2, 0), "JP621": Place(75.8, 27.3, 0),
+    return {"JP820": Place(13.5, 25.8), "C13": Place(8.3, 29.6), "C12": Place(11.9, 29.6),
+            "JP700": Place(24.0, 28.2, 0), "JP701": Place(30.5, 28.2, 0),
+            "JP600": Place(41.0, 28.2, 0), "JP601": Place(50.8, 27.3, 0),
+            "JP620": Place(57.2, 28.2, 0), "JP621": Place(67.0, 27.3, 0),
             "JP800": Place(9.5, 57.6, 0)}
 
 
 def signs(width: float, height: float) -> dict[str, Place]:
     """Lights and test points."""
     return {"D4": Place(width - 3.0, 69, 0), "D5": Place(width - 3.0, 65.5, 0),
-            "D6": Place(width - 3.0, 72.5, 0), "D743": Place(43.0, 28.6, 0),
-            "TP1": Place(70.9, 38.5), "TP2": Place(70.9, 35), "TP3": Place(74.6, 35),
-            "TP4": Place(70.9, 31.5), "TP5": Place(74.6, 38.5)}
+            "D6": Place(width - 3.0, 72.5, 0), "D743": Place(36.6, 28.6, 0),
+            "TP1": Place(69.6, 38.5), "TP2": Place(69.6, 35), "TP3": Place(73.3, 35),
+            "TP4": Place(73.3, 31.5), "TP5": Place(73.3, 38.5)}
 
 
 def islands(board: Board) -> dict[str, Box]:
@@ -102,6 +107,9 @@ class Placer:
         if footprint.name.startswith("JST") or part.component.family == "led":
             box = footprint.courtyard
             return box[0], box[1] - 1.3, box[2], box[3]
+        if footprint.name.startswith("MICRO") and part.label:
+            box = footprint.courtyard
+            return box[0], box[1], box[2], box[3] + 1.3
         if part.component.family in ("jumper", "test_point"):
             return grown(footprint.body, 1.2)  # for its label
         if not 5 <= len(footprint.pads) <= 17 or part.component.family == "connector":
