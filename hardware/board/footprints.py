@@ -125,8 +125,8 @@ def micro_fit(columns: int, rows: int = 1) -> Footprint:
     return Footprint(f"MICRO-FIT-{columns}" if rows == 1 else f"MICRO-FIT-{rows}x{columns}",
                      tuple(pads), (-side - 0.495, -9.42, wide + side + 0.495,
                                    1.48 if rows == 1 else 4.25), body, 6.2 if rows == 1 else 7.4,
-                     f"Connector_Molex:Molex_Micro-Fit_3.0_{series}-{count:02}00_{rows}x{columns:02}"
-                     "_P3.00mm_Horizontal", kind="thru")
+                     f"Connector_Molex:Molex_Micro-Fit_3.0_{series}-{count:02}00_{rows}x"
+                     f"{columns:02}_P3.00mm_Horizontal", kind="thru")
 
 
 def hole(drill: float = 3.2) -> Footprint:

@@ -248,8 +248,8 @@ def widths(board: Board, layout: Layout) -> list[str]:
 
 
 def isolation_gap(board: Board, layout: Layout) -> list[str]:
-    """Copper of an isolated side, its plane included, is 2 mm from all other; below the isolator its
-    own pads decide."""
+    """Copper of an isolated side, its plane included, is 2 mm from all other; below the isolator
+    its own pads decide."""
     found = shapes(board, layout)
     faults = set()
     found += [("*", ground, 0.0, (box[0], box[1]), (box[2], box[3]), box)

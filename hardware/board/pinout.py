@@ -30,7 +30,8 @@ def row(part: Part) -> str:
     words = {number: word(net) for number, net in part.nets.items()} | part.words
     pins = [f"{pin.number} {words.get(pin.number, 'open')}" for pin in part.component.pins
             if pin.number != "MP"]
-    lines, line = [], f"- **{part.label or part.ref}** ({part.ref}, {part.component.mpn}{plug(part)}):"
+    head = f"{part.ref}, {part.component.mpn}{plug(part)}"
+    lines, line = [], f"- **{part.label or part.ref}** ({head}):"
     for i, text in enumerate(pins):
         piece = f" {text}{',' if i + 1 < len(pins) else ''}"
         if len(line) + len(piece) > 99:
@@ -47,6 +48,6 @@ def document(board: Board) -> str:
     return "\n".join([
         f"# Connectors: {board.title}", "",
         "Made from the description in `hardware/board`: change that, not this file. On JST GH, pin",
-        "1 is the one with the dot, on Molex Micro-Fit the one with the square pad. Words are signals",
-        "of the firmware where there is one.", "",
+        "1 is the one with the dot, on Molex Micro-Fit the one with the square pad. Words are",
+        "signals of the firmware where there is one.", "",
         *(row(part) for part in parts), ""])
