@@ -316,7 +316,9 @@ TEST_CASE("verify: stamps by the camera's clock or by arrival are held against t
         each.frame.flags = static_cast<std::uint32_t>(kind);
         each.frame.board_time = {};
     }
-    CHECK(verdict_of(verify(drive.evidence()), "cam0").grade() == Grade::plausible);
+    const Verification plausible = verify(drive.evidence());
+    CHECK(verdict_of(plausible, "cam0").grade() == Grade::plausible);
+    CHECK_FALSE(verdict_of(plausible, "cam0").worst_second);
     for (std::size_t i = 100; i < 200; ++i) drive.frames(0)[i].time.ns += 37'000 * millisecond;
     drive.frames(0)[300].time.ns -= millisecond;
     const Verification verification = verify(drive.evidence());
@@ -328,7 +330,7 @@ TEST_CASE("verify: stamps by the camera's clock or by arrival are held against t
     CHECK(untrusted_items(verdict) <= 102);  // the one after the jump goes back
 }
 
-TEST_CASE("verify: the worst second is that with the most items of the worst grade") {
+TEST_CASE("verify: the worst second is that with the most untrusted items") {
     Drive drive;
     drive.frames(0)[10].time.ns += 5 * millisecond;
     for (std::size_t i = 200; i < 230; ++i) drive.frames(0)[i].time.ns += millisecond;

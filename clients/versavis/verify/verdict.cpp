@@ -81,11 +81,7 @@ constexpr FindingText texts[] = {
 };
 static_assert(std::size(texts) == finding_count);
 
-/// Of two findings about a second each.
 bool is_worse(const WorstSecond& a, const WorstSecond& b) {
-    const auto grade_a = grade_of(a.finding);
-    const auto grade_b = grade_of(b.finding);
-    if (grade_a != grade_b) return grade_a < grade_b;
     return a.items != b.items ? a.items > b.items : absolute(a.worst) > absolute(b.worst);
 }
 
@@ -178,6 +174,7 @@ StreamVerdict VerdictBuilder::finish() {
             span.to_s = second;
             span.items += cell.items;
             if (absolute(cell.worst) > absolute(span.worst)) span.worst = cell.worst;
+            if (grade_of(finding) != Grade::untrusted) continue;
             const WorstSecond here{finding, second, cell.items, cell.worst};
             if (!verdict_.worst_second || is_worse(here, *verdict_.worst_second))
                 verdict_.worst_second = here;

@@ -72,7 +72,7 @@ struct FindingSpan {
     Duration worst;  ///< by amount; 0: it has none
 };
 
-/// Of the worst grade, the second and the finding with the most items.
+/// The second with the most items that one finding makes untrusted, and that finding.
 struct WorstSecond {
     Finding finding{};
     std::int64_t second = 0;
@@ -100,8 +100,8 @@ struct StreamVerdict {
     std::uint64_t lost = 0;                 ///< as the recorder noted
     Duration sigma;                         ///< median
     std::map<std::int64_t, SecondVerdict> seconds;
-    std::vector<FindingSpan> findings;  ///< worst first
-    std::optional<WorstSecond> worst_second;
+    std::vector<FindingSpan> findings;        ///< worst first
+    std::optional<WorstSecond> worst_second;  ///< none: nothing is untrusted
 
     Grade grade() const;
 };
