@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Debian's kernel for machines of QEMU, whose first program reports by lines "guest: ..."."""
+import contextlib
 import pathlib
 import re
+import shutil
 import subprocess
+import tempfile
 import threading
 import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+FILES_MODULES = ["virtio_pci", "9pnet_virtio", "9p", "overlay"]
 
 
 def output_of(*command, **options):
@@ -56,6 +62,45 @@ def start(image, archive, words, *options):
          "-initrd", archive, "-append", f"console=ttyS0 quiet panic=-1 {words}", *options],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         errors="replace", bufsize=1)
+
+
+def _overlay_root(root, directory, version, names):
+    for folder in ("bin", "modules"):
+        (root / folder).mkdir(parents=True)
+    shutil.copy(HERE / "guest_overlay_init", root / "init")
+    shutil.copy("/bin/busybox", root / "bin")
+    files = [pathlib.Path(file) for file in modules(directory, version, names)]
+    for file in files:
+        shutil.copy(file, root / "modules")
+    (root / "modules/order").write_text("".join(f"{file.name}\n" for file in files))
+
+
+def check_in_guest(build, program, limit_s, words="", board=False):
+    """Runs a program of sh in a machine that sees the files of this system, and keeps changes in
+    memory; with a board at its USB, if wanted. Says which of the program's checks failed; returns
+    the exit code."""
+    directory = build / "linux"
+    image, version = kernel(directory)
+    checks = re.findall(r"^check '([^']+)'", program.read_text(), re.M)
+    with tempfile.TemporaryDirectory() as temporary, contextlib.ExitStack() as stack:
+        work = pathlib.Path(temporary)
+        _overlay_root(work / "root", directory, version,
+                      FILES_MODULES + (["xhci_pci"] if board else []))
+        pack(work / "root", work / "root.cpio")
+        options = ["-smp", "2", "-virtfs",
+                   "local,path=/,mount_tag=below,security_model=none,readonly=on,multidevs=remap"]
+        if board:
+            emulated = start_board(build, work / "board")
+            stack.callback(emulated.wait)
+            stack.callback(emulated.kill)
+            options += with_board(work / "board")
+        guest = start(image, work / "root.cpio", f"{words} run={program} build={build}", *options)
+        passed = follow(guest, limit_s)
+    missing = [check for check in checks if check not in passed]
+    for check in missing:
+        print(f"FAILED: {check}")
+    print(f"{len(checks) - len(missing)} of {len(checks)} checks passed on Linux {version}")
+    return 1 if missing else 0
 
 
 def start_board(build, socket):

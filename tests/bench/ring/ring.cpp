@@ -35,6 +35,8 @@ Outcomes race_all(const std::vector<Transport>& transports, const Load& load) {
 }
 
 double p50(const Outcome& outcome) { return quantile(outcome.delays_ns, 0.5); }
+double cpu(const Outcome& outcome) { return outcome.cpu_ns_per_item(); }
+double time_per_byte(const Outcome& outcome) { return 1 / outcome.bytes_per_second(); }
 
 /// The figures of all transports, for information.
 void report(Metrics& metrics, const std::string& load, const Outcomes& outcomes) {
@@ -131,7 +133,6 @@ void measure_cost(Metrics& metrics, const std::optional<Transport>& peer, unsign
     load.interval = milliseconds(2);
     const Outcomes outcomes =
         race_all(with({versavis_ring(), ring_without_history(), bare_futex()}, peer), load);
-    const auto cpu = [](const Outcome& outcome) { return outcome.cpu_ns_per_item(); };
     const auto name = fmt::format("frame, CPU, {} waiting", readers);
     for (const auto& [transport, outcome] : outcomes)
         metrics.push_back({fmt::format("{}, {}", name, transport), cpu(outcome) / 1000, "us", {}});
@@ -156,11 +157,27 @@ void measure_throughput(Metrics& metrics, const std::optional<Transport>& peer) 
                            outcome.bytes_per_second() * 1e-9,
                            "GB/s",
                            {}});
-    const auto time_per_byte = [](const Outcome& outcome) {
-        return 1 / outcome.bytes_per_second();
-    };
     compare(metrics, "frames unthrottled, time per byte", outcomes, "iceoryx", time_per_byte,
             1 / 1.1);
+}
+
+/// What it costs that nobody can cut a ring short under its readers.
+void measure_sealed(Metrics& metrics) {
+    const std::vector<Transport> both{versavis_ring(), sealed_ring()};
+    Load load;
+    load.readers = 4;
+    compare(metrics, "imu, 4 waiting", race_all(both, load), "ring", p50, 1.05, sealed);
+    load.size = frame_size;
+    load.items = 1000;
+    load.interval = milliseconds(2);
+    const Outcomes frames = race_all(both, load);
+    compare(metrics, "frame, 4 waiting", frames, "ring", p50, 1.05, sealed);
+    compare(metrics, "frame, CPU, 4 waiting", frames, "ring", cpu, 1.05, sealed);
+    load.readers = 1;
+    load.interval = {};
+    load.reading = Reading::all_bytes;
+    compare(metrics, "frames unthrottled, time per byte", race_all(both, load), "ring",
+            time_per_byte, 1.05, sealed);
 }
 
 void measure_sets(Metrics& metrics) {
@@ -257,6 +274,7 @@ std::vector<Metric> bench_ring() {
     measure_cost(metrics, peer, 1, 0.6);
     measure_cost(metrics, peer, 4, 0.4);
     measure_throughput(metrics, peer);
+    measure_sealed(metrics);
     measure_sets(metrics);
     return metrics;
 }

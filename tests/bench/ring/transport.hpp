@@ -59,6 +59,10 @@ Transport versavis_ring();
 inline constexpr auto without_history = "ring without history";
 Transport ring_without_history();
 
+/// As with `[memory] sealed`.
+inline constexpr auto sealed = "sealed ring";
+Transport sealed_ring();
+
 /// The same, but readers from number 1 on are a thousand threads that wait in a loop.
 Transport crowded_ring();
 

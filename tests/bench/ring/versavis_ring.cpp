@@ -39,9 +39,9 @@ ring::Shape shape_without_history(const Channel& channel) {
 
 class RingSender : public Sender {
  public:
-    RingSender(const Channel& channel, const ring::Shape& shape)
+    RingSender(const Channel& channel, const ring::Shape& shape, bool is_sealed = false)
         : size_(static_cast<std::uint32_t>(channel.size)),
-          writer_(checked(ring::Writer::create(channel.directory, shape))) {}
+          writer_(checked(ring::Writer::create({channel.directory, is_sealed}, shape))) {}
 
     std::byte* loan() override {
         // As often as the service does, and like there not within the publication.
@@ -128,6 +128,10 @@ std::unique_ptr<Sender> sender_without_history(const Channel& channel) {
     return std::make_unique<RingSender>(channel, shape_without_history(channel));
 }
 
+std::unique_ptr<Sender> sender_of_sealed(const Channel& channel) {
+    return std::make_unique<RingSender>(channel, shape_of(channel), true);
+}
+
 std::unique_ptr<Receiver> receiver(const Channel& channel, unsigned) {
     return std::make_unique<RingReceiver>(channel);
 }
@@ -141,6 +145,7 @@ std::unique_ptr<Receiver> receiver_or_crowd(const Channel& channel, unsigned rea
 
 Transport versavis_ring() { return {"ring", sender, receiver}; }
 Transport ring_without_history() { return {without_history, sender_without_history, receiver}; }
+Transport sealed_ring() { return {sealed, sender_of_sealed, receiver}; }
 Transport crowded_ring() { return {"ring among a crowd", sender, receiver_or_crowd}; }
 
 }  // namespace versavis::bench
