@@ -178,12 +178,13 @@ bool ImuPipeline::may_adopt(Promptness promptness, const Implausibility& doubt,
     if (samples && departures)
         return *samples && *departures && !early
                    ? pulse_filter_.stepped(exchanges)
-                   : pulse_filter_.prevailed(exchanges, clock::exchanges_to_believe);
+                   : pulse_filter_.prevailed(exchanges, least_to_prevail);
     const bool confirmed = doubt.reason == EventReason::implausible_number
                                ? promptness == Promptness::usual
                                : arrival_confirms(promptness, {doubt.said - doubt.expected});
-    return confirmed && !early ? pulse_filter_.stepped(exchanges)
-                               : pulse_filter_.prevailed(exchanges);
+    return confirmed && !early
+               ? pulse_filter_.stepped(exchanges)
+               : pulse_filter_.prevailed(exchanges, step_promptness_.least_to_prevail());
 }
 
 void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample,

@@ -299,7 +299,8 @@ TEST_CASE("record_filter: a step is believed when its delay confirms it, or noth
     };
     const auto [off, promptness, believed_after] = GENERATE(
         Step{milliseconds(1), Promptness::usual, 5}, Step{-milliseconds(1), Promptness::usual, 5},
-        Step{milliseconds(1), Promptness::early, 97}, Step{-milliseconds(1), Promptness::late, 97},
+        Step{milliseconds(1), Promptness::early, 97},
+        Step{-milliseconds(1), Promptness::late, 1 + least_to_prevail},
         Step{microseconds(300), Promptness::usual, 97},
         Step{milliseconds(1), Promptness::unknown, 97});
     std::uint64_t records = 1;

@@ -246,8 +246,7 @@ void StreamWitnesses::compare(Stream& stream, const Answers& quickest_answers, H
         stream.persistence.agree();
         return;
     }
-    if (stream.persistence.contradict(doubt_ == Duration{} ? exchanges_to_believe
-                                                           : most_to_prevail))
+    if (stream.persistence.contradict(doubt_ == Duration{} ? least_to_prevail : most_to_prevail))
         return stream.forget_lead();
     stream.late = off > Duration{} ? stream.late + 1 : 0;
     if (off < Duration{} || stream.late >= intervals_to_be_late) stream.departure = -off;

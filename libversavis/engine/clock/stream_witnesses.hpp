@@ -15,9 +15,6 @@
 
 namespace versavis::clock {
 
-/// Half a minute of ten exchanges a second, until messages are believed that no answer confirms.
-constexpr std::uint64_t exchanges_to_believe = 300;
-
 /// What a stream can say of others.
 enum class Witness : std::uint8_t {
     none,  ///< nothing: its times may be off alone

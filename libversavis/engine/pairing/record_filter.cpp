@@ -319,7 +319,8 @@ bool RecordFilter::may_adopt(const ReceivedRecord& received, const Implausibilit
             ? filter_.believed().only_skips(received.record)
             : arrival_confirms(received.promptness, {doubt.said - doubt.expected}) &&
                   !step_promptness_.mostly_early();
-    return confirmed ? filter_.stepped(received.exchanges) : filter_.prevailed(received.exchanges);
+    return confirmed ? filter_.stepped(received.exchanges)
+                     : filter_.prevailed(received.exchanges, step_promptness_.least_to_prevail());
 }
 
 }  // namespace versavis::pairing

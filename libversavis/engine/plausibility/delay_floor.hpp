@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "engine/plausibility/persistence.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis {
@@ -44,16 +45,22 @@ class StepPromptness {
     void doubted(Promptness promptness) {
         if (promptness == Promptness::usual) score_ = std::min(score_ + 1, furthest);
         if (promptness == Promptness::early) score_ = std::max(score_ - 1, -furthest);
+        if (promptness == Promptness::usual) late_ = std::max(late_ - 1, -furthest);
+        if (promptness == Promptness::late) late_ = std::min(late_ + 1, furthest);
     }
-    void believed() { score_ = 0; }
+    void believed() { score_ = late_ = 0; }
     bool mostly_early() const { return score_ < 0; }
+
+    /// Exchanges that they must agree for: most of them name too early a time, or all wait.
+    std::uint64_t least_to_prevail() const { return late_ > 0 ? versavis::least_to_prevail : 0; }
 
  private:
     /// Half: a busy host more often delays so many in a row. Twice: a step that is followed by the
     /// estimate is believed after twice as many messages.
     static constexpr int furthest = 16;
 
-    int score_ = 0;
+    int score_ = 0;  ///< usual less early
+    int late_ = 0;   ///< late less usual
 };
 
 /// Not thread-safe.

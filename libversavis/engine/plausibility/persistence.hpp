@@ -11,6 +11,11 @@ namespace versavis {
 /// other was.
 constexpr std::uint64_t most_to_prevail = 1200;
 
+/// 70 s of ten exchanges a second, for a stream that the time of its arrival contradicts, too: a
+/// minute of false times is not believed, however short the time before it was. If higher, a stream
+/// whose first messages were false, or late as on a host that boots, is withheld for longer.
+constexpr std::uint64_t least_to_prevail = 700;
+
 /// What contradicts prevails when it has lasted for twice as long as what it contradicts. Some
 /// agree by chance while others contradict, so one that agrees only takes back a few. Not
 /// thread-safe.
