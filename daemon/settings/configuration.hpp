@@ -218,7 +218,7 @@ struct TimeOutputConfiguration {
 struct MemoryConfiguration {
     TomlEntry entry;
     bool lock = false;    ///< all of the service's memory, rings included, stays in RAM
-    bool sealed = false;  ///< nobody can cut a ring short under its readers
+    bool sealed = true;  ///< nobody can cut a ring short under its readers
 };
 
 struct Configuration {

@@ -25,15 +25,15 @@ constexpr int seals = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_
 
 Unexpected<> not_handed(const std::filesystem::path& path) {
     if (errno == ECONNREFUSED)
-        return failure(ErrorCode::absent, path.string(), "no such stream: its service has ended",
-                       "start it; 'versavis list' shows the streams");
+        return failure(ErrorCode::absent, path.string(), "no such stream: its service has died",
+                       "see its log ('journalctl -u versavisd'), then restart it");
     if (errno == EACCES)
         return failure(ErrorCode::forbidden, path.string(), "permission denied",
                        "join the group that may read streams (usually 'versavis')");
     return failure(code_of(errno), path.string(),
                    "was not handed over by the service: " +
                        std::error_code(errno, std::generic_category()).message(),
-                   "is it still running? try again");
+                   "does it hang? see its log ('journalctl -u versavisd')");
 }
 
 /// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.

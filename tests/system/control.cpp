@@ -155,7 +155,7 @@ TEST_CASE("control: a camera stops and starts, and the file is read again") {
     std::string next = text;
     for (std::size_t at = 0; (at = next.find("rate_hz = 20", at)) != std::string::npos;)
         next.replace(at, 12, "rate_hz = 25");
-    std::ofstream(stack.configuration_path()) << next << "[memory]\nsealed = true\n";
+    std::ofstream(stack.configuration_path()) << next << "[memory]\nsealed = false\n";
     const auto before_reload = new_set(*sets);
     REQUIRE(before_reload);
     const std::uint64_t left_out = sets->report().left_out;

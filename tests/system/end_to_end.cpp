@@ -238,7 +238,7 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
     read_until(stream, [](const auto& item) { return item.found == test::Found::gone; });
     std::string output;
     CHECK(stack.tool({"status"}, &output) == 69);
-    CHECK_THAT(output, Catch::Contains("died or hangs"));
+    CHECK_THAT(output, Catch::Contains("service has died"));
     stack.start_service();
     read_until(stream, [](const auto& item) { return item.found == test::Found::restarted; });
     const auto frame = read_until(stream, is_item);

@@ -85,9 +85,7 @@ TEST_CASE("examples: without a service each says so in a sentence") {
 }
 
 TEST_CASE("examples: each does what it says, and goes on after a restart") {
-    test::StackSettings settings{"examples", 61, 2, 20, "", "", ""};
-    settings.imu_extra = "[memory]\nsealed = true\n";  // other tests read plain rings
-    Stack stack(settings);
+    Stack stack(test::StackSettings{"examples", 61, 2, 20, "", "", ""});
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status([](const auto& status) { return status["health"] == "ok"; });

@@ -215,7 +215,7 @@ TEST_CASE_METHOD(SealedInstance,
     }));
     const auto name = directory.path() / "instance" / "frames";
     REQUIRE(std::filesystem::is_socket(name));
-    CHECK_THAT(Reader::open(name).error().message(), Catch::Contains("its service has ended"));
+    CHECK_THAT(Reader::open(name).error().message(), Catch::Contains("its service has died"));
     const auto owned = OwnedDirectory::claim(directory.path() / "instance");
     REQUIRE(owned);
     const auto own = Writer::create({owned->path(), true}, {"own", StreamKind::events, 8});

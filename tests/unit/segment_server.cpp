@@ -153,7 +153,7 @@ TEST_CASE("segment_server: where an address has no room for the path, and whatev
         CHECK(open_trusted(deep / "renamed", std::nullopt));
     }
     CHECK_THAT(open_trusted(deep / "renamed", std::nullopt).error().message(),
-               Catch::Contains("its service has ended"));
+               Catch::Contains("its service has died"));
     CHECK_FALSE(std::filesystem::exists(deep / "victim"));
 }
 

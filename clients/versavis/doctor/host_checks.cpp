@@ -17,8 +17,8 @@ namespace versavis::client {
 
 namespace {
 
-/// The service makes no ring that would leave less of /dev/shm and memory.
-constexpr std::uint64_t least_shared_mib = 64;
+/// The service makes no ring that would leave less memory.
+constexpr std::uint64_t least_memory_mib = 64;
 /// Of the disk: measurements and descriptions are small.
 constexpr std::uint64_t least_disk_mib = 16;
 
@@ -126,6 +126,28 @@ Findings check_space(const Subject& subject, const std::string& check, const std
     return {finding};
 }
 
+constexpr auto no_rings = "the service cannot make its rings when it starts";
+
+/// Where the rings lie: sealed ones have no file.
+Findings check_memory(const Subject& subject) {
+    if (subject.configuration && !subject.configuration->sealed_rings)
+        return check_space(
+            subject, "shm", "/dev/shm", least_memory_mib, no_rings,
+            "du -sh /dev/shm/* says who fills it; sudo mount -o remount,size=75% /dev/shm");
+    std::istringstream text(subject.files.text("/proc/meminfo").value_or(""));
+    std::string name;
+    std::uint64_t kib = 0;
+    while (text >> name >> kib && name != "MemAvailable:") std::getline(text, name);
+    if (!text) return {};
+    Finding finding{"memory", "", fmt::format("{} MiB available", kib >> 10U)};
+    if (kib >> 10U < least_memory_mib) {
+        finding.verdict = Verdict::bad;
+        finding.reason = no_rings;
+        finding.cure = "ps aux --sort=-rss | head says which programs take it";
+    }
+    return {finding};
+}
+
 Findings check_permission(const Subject& subject) {
     const std::string directory = instance_directory(subject.instance);
     if (::access(directory.c_str(), R_OK | X_OK) == 0)
@@ -147,10 +169,7 @@ Findings check_host(const Subject& subject) {
     };
     add(check_realtime(subject));
     add(check_governor(subject.files));
-    add(check_space(
-        subject, "shm", "/dev/shm", least_shared_mib,
-        "the service cannot make its rings when it starts",
-        "du -sh /dev/shm/* says who fills it; sudo mount -o remount,size=75% /dev/shm"));
+    add(check_memory(subject));
     if (subject.configuration)
         add(check_space(
             subject, "disk", subject.configuration->state_directory, least_disk_mib,

@@ -65,6 +65,7 @@ Expected<ConfiguredParts> read_configured_parts(const std::string& path) {
     parts.board_link = (*table)["board"]["link"].value_or(parts.board_link);
     parts.board_serial = (*table)["board"]["serial"].value_or(parts.board_serial);
     parts.state_directory = (*table)["state_directory"].value_or(parts.state_directory);
+    parts.sealed_rings = (*table)["memory"]["sealed"].value_or(parts.sealed_rings);
     parts.output = (*table)["clock"]["output"].value_or(parts.output);
     if (const auto* cameras = (*table)["camera"].as_array())
         for (const auto& camera : *cameras)

@@ -26,6 +26,7 @@ struct ConfiguredParts {
     std::string board_serial;
     std::string state_directory = "/var/lib/versavis";
     std::string output = "realtime";
+    bool sealed_rings = true;
     std::vector<std::pair<std::string, std::string>> cameras;  ///< name and device
 };
 
