@@ -217,7 +217,7 @@ struct TimeOutputConfiguration {
 
 struct MemoryConfiguration {
     TomlEntry entry;
-    bool lock = false;    ///< all of the service's memory, rings included, stays in RAM
+    bool lock = false;   ///< all of the service's memory, rings included, stays in RAM
     bool sealed = true;  ///< nobody can cut a ring short under its readers
 };
 

@@ -67,8 +67,8 @@ struct Options {
     /// User id that the stream must belong to. None: that of the name or number in $VERSAVIS_OWNER;
     /// without it root, this process's user, or `versavis`.
     std::optional<std::uint32_t> owner{};
-    /// Only streams that no one, not even their owner, can cut short, which would end a program that
-    /// reads with SIGBUS: not those of a service with `sealed = false`.
+    /// Only streams that no one, not even their owner, can cut short, which would end a reading
+    /// program with SIGBUS: not those of a service with `sealed = false`.
     bool sealed_only = false;
     /// How long open() waits for a stream that is not there yet.
     Duration wait{};
