@@ -25,6 +25,7 @@ namespace {
 rig::Verdict judge_running(const Stack& stack, double seconds) {
     const rig::Verdict verdict = judged(stack, seconds);
     INFO(rig::to_table(verdict));
+    if (!verdict.ok) WARN("it is not ok");  // with the table
     for (const auto& [name, stream] : verdict.streams) {
         CHECK(stream.wrong_pairs == 0);
         CHECK(stream.items > 0);

@@ -136,7 +136,8 @@ TEST_CASE("process: a writer lives on for readers in another time namespace") {
     }));
 }
 
-TEST_CASE("process: one that may not be asked is there, and one that cannot be seen is unknown") {
+TEST_CASE("process: one that may not be asked is there, and one that cannot be seen is unknown",
+          "[kernel]") {
     if (::geteuid() != 0) return;  // only root can become somebody else, or see another /proc
     const Constants own = own_constants();
     CHECK(in_process(

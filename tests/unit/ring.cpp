@@ -479,7 +479,7 @@ bool spares_whose_heart_beats() {
 
 }  // namespace
 
-TEST_CASE_METHOD(Fixture, "ring: one that cannot be mapped leaves nothing behind") {
+TEST_CASE_METHOD(Fixture, "ring: one that cannot be mapped leaves nothing behind", "[kernel]") {
     CHECK(in_process([&] { return cannot_be_mapped(directory.path()); }));
 }
 

@@ -435,7 +435,8 @@ TEST_CASE_METHOD(ReaderStreams,
 }
 
 TEST_CASE_METHOD(ReaderStreams,
-                 "ring_reader: a writer on another clock lives once its heart has beaten") {
+                 "ring_reader: a writer on another clock lives once its heart has beaten",
+                 "[kernel]") {
     Writer writer = events();
     const HostTime far = host_now() - seconds(1000);
     writer.heartbeat(far);
@@ -480,8 +481,8 @@ Mapped mapped(const std::filesystem::path& file) {
 
 }  // namespace
 
-TEST_CASE_METHOD(ReaderStreams,
-                 "ring_reader: all that it may read is in memory from the beginning") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: all that it may read is in memory from the beginning",
+                 "[kernel]") {
     const Writer writer = frames(64);
     const Reader reader = open("frames");
     const Mapped found = mapped(directory.path() / "frames");
@@ -490,7 +491,8 @@ TEST_CASE_METHOD(ReaderStreams,
 }
 
 TEST_CASE_METHOD(ReaderStreams,
-                 "ring_reader: what a dead writer left is read, but not fetched into memory") {
+                 "ring_reader: what a dead writer left is read, but not fetched into memory",
+                 "[kernel]") {
     Writer writer = frames(64);
     publish_bytes(writer, 10, 7);
     writer.heartbeat(HostTime{0});

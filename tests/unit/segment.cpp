@@ -149,7 +149,8 @@ TEST_CASE_METHOD(Copies, "segment: who only reads needs no right to write") {
     }));
 }
 
-TEST_CASE("segment: all pages are at hand, also where the kernel must be asked for each") {
+TEST_CASE("segment: all pages are at hand, also where the kernel must be asked for each",
+          "[kernel]") {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto writer =
         *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, 200, page_size});
@@ -170,7 +171,8 @@ TEST_CASE("segment: all pages are at hand, also where the kernel must be asked f
     ::munmap(static_cast<std::byte*>(gap) + size, page_size);
 }
 
-TEST_CASE_METHOD(Copies, "segment: no page is touched that the kernel cannot have at hand") {
+TEST_CASE_METHOD(Copies, "segment: no page is touched that the kernel cannot have at hand",
+                 "[kernel]") {
     const auto mapping = *Mapping::open(directory.path() / "frames", Mapping::Access::read_only);
     CHECK(test::in_process([&] {
         const std::size_t before = pages_at_hand(mapping);

@@ -633,7 +633,7 @@ TEST_CASE_METHOD(Rig, "set_reader: a camera that appears in another life is a re
     CHECK(sets.report().left_out == 1);
 }
 
-TEST_CASE_METHOD(Rig, "set_reader: opening waits for its cameras [threads]", "[threads]") {
+TEST_CASE_METHOD(Rig, "set_reader: opening waits for its cameras [threads]", "[threads][kernel]") {
     b.reset();
     std::filesystem::remove(directory.path() / "b");
     SetOptions patient = options();
