@@ -64,10 +64,11 @@ def start(image, archive, words, *options):
         errors="replace", bufsize=1)
 
 
-def _overlay_root(root, directory, version, names):
+def make_root(root, init, directory, version, names):
+    """What the machine begins with: its first program, busybox, and these modules of the kernel."""
     for folder in ("bin", "modules"):
         (root / folder).mkdir(parents=True)
-    shutil.copy(HERE / "guest_overlay_init", root / "init")
+    shutil.copy(init, root / "init")
     shutil.copy("/bin/busybox", root / "bin")
     files = [pathlib.Path(file) for file in modules(directory, version, names)]
     for file in files:
@@ -84,8 +85,8 @@ def check_in_guest(build, program, limit_s, words="", board=False):
     checks = re.findall(r"^check '([^']+)'", program.read_text(), re.M)
     with tempfile.TemporaryDirectory() as temporary, contextlib.ExitStack() as stack:
         work = pathlib.Path(temporary)
-        _overlay_root(work / "root", directory, version,
-                      FILES_MODULES + (["xhci_pci"] if board else []))
+        make_root(work / "root", HERE / "guest_overlay_init", directory, version,
+                  FILES_MODULES + (["xhci_pci"] if board else []))
         pack(work / "root", work / "root.cpio")
         options = ["-smp", "2", "-virtfs",
                    "local,path=/,mount_tag=below,security_model=none,readonly=on,multidevs=remap"]

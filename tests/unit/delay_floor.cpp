@@ -97,7 +97,7 @@ TEST_CASE("delay_floor: after a step of the clock, more delays seem early than u
     }
 }
 
-TEST_CASE("delay_floor: what most of them say counts for a step, and those late say nothing") {
+TEST_CASE("delay_floor: what most of them say counts for a step, early or not") {
     StepPromptness promptness;
     CHECK_FALSE(promptness.mostly_early());
     const auto doubted = [&](int times, Promptness how) {
@@ -116,4 +116,19 @@ TEST_CASE("delay_floor: what most of them say counts for a step, and those late 
     doubted(30, Promptness::early);
     promptness.believed();
     CHECK_FALSE(promptness.mostly_early());
+}
+
+TEST_CASE("delay_floor: where most of them are late, they must agree for longer") {
+    StepPromptness promptness;
+    CHECK(promptness.least_to_prevail() == 0);
+    for (int i = 0; i < 3; ++i) promptness.doubted(Promptness::late);
+    promptness.doubted(Promptness::unknown);
+    promptness.doubted(Promptness::usual);
+    CHECK(promptness.least_to_prevail() == least_to_prevail);
+    promptness.doubted(Promptness::usual);
+    promptness.doubted(Promptness::usual);
+    CHECK(promptness.least_to_prevail() == 0);
+    promptness.doubted(Promptness::late);
+    promptness.believed();
+    CHECK(promptness.least_to_prevail() == 0);
 }

@@ -150,6 +150,17 @@ TEST_CASE("stream_witnesses: what lasts is believed in the end") {
     CHECK(link.all_usual());
 }
 
+TEST_CASE("stream_witnesses: a minute of false times of one stream is not the new usual") {
+    Link link;
+    link.run(seconds(10));
+    const Duration lie = GENERATE(milliseconds(1), -milliseconds(1));
+    link.lie_of_stream = [lie](double) { return lie; };
+    link.run(seconds(60));
+    CHECK(link.witnesses.departure(0));
+    link.run(seconds(20));
+    CHECK(link.all_usual());
+}
+
 TEST_CASE("stream_witnesses: exchanges may be off by what no stream can deny yet") {
     Link link;
     link.run(milliseconds(100));

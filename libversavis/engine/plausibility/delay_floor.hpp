@@ -43,15 +43,17 @@ inline bool arrival_confirms(Promptness promptness, Duration apart) {
 class StepPromptness {
  public:
     void doubted(Promptness promptness) {
-        if (promptness == Promptness::usual) score_ = std::min(score_ + 1, furthest);
-        if (promptness == Promptness::early) score_ = std::max(score_ - 1, -furthest);
-        if (promptness == Promptness::usual) late_ = std::max(late_ - 1, -furthest);
+        if (promptness == Promptness::early) early_ = std::min(early_ + 1, furthest);
         if (promptness == Promptness::late) late_ = std::min(late_ + 1, furthest);
+        if (promptness != Promptness::usual) return;
+        early_ = std::max(early_ - 1, -furthest);
+        late_ = std::max(late_ - 1, -furthest);
     }
-    void believed() { score_ = late_ = 0; }
-    bool mostly_early() const { return score_ < 0; }
+    void believed() { early_ = late_ = 0; }
+    bool mostly_early() const { return early_ > 0; }
 
-    /// Exchanges that they must agree for: most of them name too early a time, or all wait.
+    /// Exchanges that they must agree for at least, until they prevail. Where most of them are
+    /// late, the times that they name may be too early.
     std::uint64_t least_to_prevail() const { return late_ > 0 ? versavis::least_to_prevail : 0; }
 
  private:
@@ -59,8 +61,8 @@ class StepPromptness {
     /// estimate is believed after twice as many messages.
     static constexpr int furthest = 16;
 
-    int score_ = 0;  ///< usual less early
-    int late_ = 0;   ///< late less usual
+    int early_ = 0;  ///< less those usual
+    int late_ = 0;   ///< the same
 };
 
 /// Not thread-safe.
