@@ -49,6 +49,11 @@ constexpr Duration shortest_time_pulse = milliseconds(1);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
 
+Duration sync_period(const BoardScenario& board) {
+    if (board.sync_hz == 0) return {};
+    return Duration{std::llround(1e9 / board.sync_hz / (1 + board.sync_skew_ppm * 1e-6))};
+}
+
 std::string sentence(const std::string& body) {
     unsigned sum = 0;
     for (const char c : body) sum ^= static_cast<unsigned char>(c);
@@ -109,6 +114,7 @@ BoardHost::BoardHost(const World& world, std::string socket_path,
     : serial_(world.scenario.board.serial),
       seed_(world.scenario.seed),
       clock_errors_(world.scenario.board.clock),
+      sync_period_{sync_period(world.scenario.board)},
       link_delay_{std::llround(world.scenario.board.link_ms * 1e6)},
       imu_name_(world.scenario.imu),
       socket_path_(std::move(socket_path)),
@@ -249,6 +255,7 @@ void BoardHost::live() {
         if (reset_pending_.exchange(false)) restart();
         const HostTime now = host_now();
         if (utc_) hear_gnss(now);
+        if (sync_period_.ns != 0) hear_sync(now);
         hear_auxiliaries();
         const HostTime next_sample = signal_samples(now);
         board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
@@ -298,6 +305,17 @@ void BoardHost::hear_gnss(HostTime now) {
         pulse + sentence_after + byte_at_9600_baud * static_cast<std::int64_t>(text.size());
     board_->uart_receive({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
                          clock_->device_ns(complete));
+}
+
+/// The pulses of a board whose clock runs at a rate of its own.
+void BoardHost::hear_sync(HostTime now) {
+    if (next_sync_.ns == 0) next_sync_ = now + marked_ahead;
+    if (next_sync_ - now > marked_ahead) return;
+    const auto input =
+        static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_sync});
+    board_->schedule_edge({clock_->device_ns(next_sync_), input, true});
+    board_->schedule_edge({clock_->device_ns(next_sync_ + microseconds(100)), input, false});
+    next_sync_ = next_sync_ + sync_period_;
 }
 
 /// Edges of the data-ready line, where the part is set to use it. Returns when to come again.

@@ -53,6 +53,7 @@ class BoardHost {
     void wait(HostTime until) const;
     void exchange_bytes();
     void hear_gnss(HostTime now);
+    void hear_sync(HostTime now);
     void hear_auxiliaries();
     HostTime signal_samples(HostTime now);
     void accept_host();
@@ -72,6 +73,7 @@ class BoardHost {
     std::uint64_t seed_;
     ClockErrors clock_errors_;
     std::optional<clock::OutputClock> utc_;  ///< what the GNSS receiver sends, if there is one
+    Duration sync_period_;                   ///< of another board's pulses; 0: there are none
     Duration link_delay_;
     std::string imu_name_;
     std::string socket_path_;
@@ -97,6 +99,7 @@ class BoardHost {
     std::uint32_t imu_serial_ = 0;  ///< of the newest sample that was read
     HostTime signalled_{};          ///< until here edges of the data-ready line are scheduled
     std::int64_t next_utc_s_ = 0;   ///< the second that the receiver marks next; 0: the coming one
+    HostTime next_sync_{};          ///< when the other board's next pulse comes
     using Parcels = std::deque<std::pair<HostTime, std::vector<std::uint8_t>>>;
     Parcels late_;    ///< on its way to the host
     Parcels coming_;  ///< on its way from there

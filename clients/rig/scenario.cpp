@@ -181,6 +181,8 @@ Expected<Scenario> load_scenario(const std::string& path) {
         TableReader reader(file, *table);
         reader.read("serial", scenario.board.serial);
         reader.read("gnss", scenario.board.gnss);
+        reader.read("sync_hz", scenario.board.sync_hz, 0, 10);
+        reader.read("sync_skew_ppm", scenario.board.sync_skew_ppm, -1e3, 1e3);
         reader.read("link_ms", scenario.board.link_ms, 0, 1000);
         read_clock(reader, scenario.board.clock);
         reader.finish();

@@ -20,6 +20,8 @@ struct BoardScenario {
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
     double link_ms = 0;  ///< every byte takes so long, either way
     bool gnss = false;   ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
+    double sync_hz = 0;  ///< pulses of another board at the sync input; 0: none
+    double sync_skew_ppm = 0;  ///< how much faster that board's clock runs than true time
 };
 
 /// How the rig moves: sums of sines that the seed draws. Without it, it nods.

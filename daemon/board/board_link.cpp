@@ -143,7 +143,9 @@ void BoardLink::set_state(BoardState state, const std::string& hint) {
 
 BoardReport BoardLink::report() const {
     const std::lock_guard lock(report_mutex_);
-    return report_;
+    BoardReport report = report_;
+    report.awaits_sync = awaits_sync_;
+    return report;
 }
 
 void BoardLink::run() {
@@ -201,6 +203,7 @@ Expected<> BoardLink::converse() {
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;
     set_state(BoardState::running, "");
+    awaits_sync_ = file_.ports.follow_sync;
     {
         const std::lock_guard lock(command_mutex_);
         takes_commands_ = true;
@@ -291,10 +294,13 @@ Expected<> BoardLink::configure() {
 /// conversation ends, and the next one begins with it.
 Expected<> BoardLink::change() {
     const wire::Configuration before = configuration_;
+    const bool followed_sync = file_.ports.follow_sync;
     adopt_configuration();
-    const bool able = (greeting_.hello.capabilities & wire::capability_camera_change) != 0;
+    const bool same_grid = file_.ports.follow_sync == followed_sync;
+    const bool able =
+        same_grid && (greeting_.hello.capabilities & wire::capability_camera_change) != 0;
     const CameraChange change = able ? camera_change(before, configuration_) : CameraChange{};
-    if (std::memcmp(&before, &configuration_, sizeof before) == 0) {  // it was taken back
+    if (same_grid && std::memcmp(&before, &configuration_, sizeof before) == 0) {  // taken back
         listener_.cameras_changed(accept_starts(), 0);
         return {};
     }
@@ -375,7 +381,10 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     last_packet_ = received;
     const bool used =
         use<wire::Exposure>(packet,
-                            [&](const auto& record) { listener_.exposure(record, received); }) ||
+                            [&](const auto& record) {
+                                awaits_sync_ = false;
+                                listener_.exposure(record, received);
+                            }) ||
         use<wire::ImuSample>(packet,
                              [&](const auto& sample) {
                                  if (listener_.imu_sample(sample, received))
@@ -530,6 +539,8 @@ void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
     message.cameras = mask;
     if (how == pairing::Start::pattern) message.flags = wire::start_pattern;
     if (how == pairing::Start::slow) message.flags = wire::start_slow;
+    // Once it follows the pulses, another grid would number its ticks anew.
+    if (awaits_sync_) message.flags |= wire::start_on_sync;
     {
         const std::lock_guard lock(command_mutex_);
         // board_connected() or cameras_changed() starts what streams by then.

@@ -70,6 +70,7 @@ struct BoardReport {
     std::uint64_t impossible = 0;         ///< packets with a number, nonce or time that cannot be
     std::uint64_t dropped_bytes = 0;      ///< the service did not take them in time
     bool unkept = false;                  ///< it could not store its configuration
+    bool awaits_sync = false;             ///< cameras begin with the next sync pulse
     wire::Health health{};                ///< its counters began with the service
 };
 
@@ -92,7 +93,8 @@ class BoardLink {
     /// From any thread.
     void reconfigure(const Configuration& configuration);
 
-    /// Starts or stops triggering the cameras of the mask, if the board is there. From any thread.
+    /// Starts or stops triggering the cameras of the mask, if the board is there. Those that are to
+    /// follow another board begin with its next sync pulse. From any thread.
     void start_cameras(std::uint8_t mask, pairing::Start how);
     void stop_cameras(std::uint8_t mask);
 
@@ -180,7 +182,8 @@ class BoardLink {
     mutable std::mutex report_mutex_;
     BoardReport report_;
     std::atomic<bool> stop_{false};
-    std::atomic<bool> accepting_{false};  ///< configured: cameras may be started
+    std::atomic<bool> accepting_{false};    ///< configured: cameras may be started
+    std::atomic<bool> awaits_sync_{false};  ///< the grid is to begin with a sync pulse
     std::thread thread_;
 };
 

@@ -676,6 +676,11 @@ std::string board_remark(const Status& status) {
     const BoardReport& board = status.board;
     if (!board.hint.empty()) return board.hint;
     if (board.unkept) return unkept_configuration;
+    if (board.awaits_sync)
+        return "cameras begin with pulses of the sync input: if none come, check the cable, and "
+               "that "
+               "the sending board runs, with the same 'sync_rate_hz' as this one (without the key "
+               "1 Hz is expected)";
     if (board.health.sync_state == wire::SyncState::lost)
         return "the sync input's pulses do not fit the grid, which runs on without them: check the "
                "cable, and that 'sync_rate_hz' matches the sending board";

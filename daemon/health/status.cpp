@@ -89,7 +89,7 @@ json board_json(const BoardReport& board, bool needed, bool outdated) {
             {"reset_cause", board::to_string(health.reset_cause)},
             {"pps", board::to_string(health.pps_state)},
             {"pps_error_ppb", good_pps ? json(health.pps_error_ppb) : json(nullptr)},
-            {"sync", board::to_string(health.sync_state)},
+            {"sync", board.awaits_sync ? "awaited" : board::to_string(health.sync_state)},
             {"stamp_test", board::to_string(health.stamp_test)}};
 }
 

@@ -136,6 +136,9 @@ void complete(Configuration& configuration) {
         camera.board_input_ns = configuration.board.input_delay_ns[camera.output];
         camera.board_output_ns = configuration.board.output_delay_ns[camera.output];
         if (configuration.clock.align) camera.grid_slew_ppm = configuration.clock.max_slew_ppm;
+        if (configuration.ports.follow_sync)
+            camera.grid_slew_ppm =
+                wire::limits::sync_slew_ppm + wire::limits::largest_sync_pace_ppm;
         if (camera.master.empty()) complete(camera);
     }
     for (CameraConfiguration& camera : configuration.cameras) {

@@ -190,6 +190,7 @@ struct PortConfiguration {
     double test_rate_hz = 0;                        ///< of test pulses that show neither; 0: none
     std::uint8_t test_output = wire::test_at_test;  ///< where these leave
     double sync_rate_hz = 0;                        ///< 0: none
+    bool follow_sync = false;  ///< the grid is that of the board that sends sync pulses
     double pulse_us = 100;
 };
 

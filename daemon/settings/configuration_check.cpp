@@ -599,6 +599,15 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
         findings.add(ports.entry, "sync_rate_hz",
                      "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz",
                      "raise it, or set it to 0", TomlRange{slowest_sync_hz, fastest_sync_hz});
+    if (ports.follow_sync && !contains(ports.inputs, "sync"))
+        findings.add(ports.entry, "follow_sync",
+                     "'follow_sync' needs the pulses of the sync input, which is not enabled",
+                     "add \"sync\" to 'inputs'");
+    if (ports.follow_sync && configuration.clock.align)
+        findings.add(ports.entry, "follow_sync",
+                     "the grid cannot follow sync pulses and, by 'align' of [clock], the output "
+                     "clock",
+                     "remove one of the two keys");
     const ImuConfiguration* uart = find_imu_at(configuration, 1);
     if (!test_source(configuration))
         findings.add(

@@ -518,6 +518,7 @@ const Keys<PortConfiguration>& keys<PortConfiguration>() {
              .within("0 (none), 0.1 to 10")
              .on_board(Field::sync_rate, 1e6),
          "pulses at the sync output, on the grid"},
+        {"follow_sync", flag(&Ports::follow_sync), "the grid follows another board's sync pulses"},
         {"pulse_us",
          number(&Ports::pulse_us, limits::shortest_pulse_ns / ns_per_us,
                 limits::longest_pulse_ns / ns_per_us)

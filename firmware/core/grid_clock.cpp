@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "grid_clock.hpp"
 
+#include "wire/limits.hpp"
+
 namespace versavis::firmware {
 
 namespace {
 
 constexpr Nanoseconds billion = 1'000'000'000;
 
-/// One part in this many (500 ppm): no two crystals differ by more. If lower, false pulses pass
-/// more easily; if higher, bad crystals are never followed.
-constexpr std::int64_t largest_pace = 2'000;
+/// One part in this many.
+constexpr std::int64_t largest_pace = 1'000'000 / wire::limits::largest_sync_pace_ppm;
 
 /// One part in this many (50 ppm), of two crystals that warm up. If lower, false pulses pass more
 /// easily; if higher, a gap in the pulses loses the sender sooner.
@@ -19,9 +20,7 @@ constexpr std::int64_t largest_change = 20'000;
 /// the tolerance is that much wider.
 constexpr Nanoseconds longest_first_gap = 4;
 
-/// The grid slews to a restarted sender by 1000 ppm. If higher, cameras in a chain could not follow
-/// it.
-constexpr std::int64_t sync_slew_ppb = 1'000'000;
+constexpr std::int64_t sync_slew_ppb = wire::limits::sync_slew_ppm * 1'000;
 
 /// In periods. If lower, a few lost pulses are reported as the loss of the sender; if higher, it is
 /// reported late.

@@ -29,6 +29,12 @@ inline constexpr std::uint32_t slowest_test_millihertz = 100;
 inline constexpr std::uint32_t fastest_test_millihertz = 10'000'000;
 inline constexpr std::uint32_t slowest_sync_uhz = 100'000;
 inline constexpr std::uint32_t fastest_sync_uhz = 10'000'000;
+/// Of two boards' crystals. If lower, bad ones are never followed; if higher, false pulses pass
+/// more easily.
+inline constexpr std::int64_t largest_sync_pace_ppm = 500;
+/// By which the grid goes to a sender that restarted. If higher, cameras in a chain could not
+/// follow it.
+inline constexpr std::int64_t sync_slew_ppm = 1'000;
 inline constexpr std::uint32_t slowest_nmea_baud = 1'200;
 inline constexpr std::uint32_t fastest_nmea_baud = 921'600;
 

@@ -386,6 +386,54 @@ TEST_CASE("end to end: frames of an aligned board lie at whole seconds of the ou
     CHECK(judge_running(stack, 2).ok);
 }
 
+TEST_CASE("end to end: cameras of a board that follows another expose with its pulses") {
+    constexpr double skew = 40e-6;  // of the other board
+    StackSettings settings{
+        "sync", 73, 2, 20, "exposure_us = 3000", "[board]\nsync_hz = 2\nsync_skew_ppm = 40\n", ""};
+    settings.extras = {"", "phase_us = 10000"};
+    Stack stack(settings);
+    {
+        std::ofstream file(stack.configuration_path(), std::ios::app);
+        file << "[ports]\ninputs = [\"sync\"]\nfollow_sync = true\nsync_rate_hz = 2\n";
+    }
+    stack.start_rig();
+    stack.start_service();
+    const auto followed = [](const auto& s) {
+        return healthy(s) && s["board"]["sync"] == "followed";
+    };
+    CHECK(stack.wait_for_status(followed)["board"]["hint"] == "");
+    auto events = wait_for_stream<EventStream>("events", stack.instance());
+    const auto pulse = read_until(
+        events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::sync_pulse; });
+    for (const unsigned camera : {0U, 1U}) {
+        auto stream = wait_for_stream<FrameStream>("cam" + std::to_string(camera), "sync");
+        for (int i = 0; i < 60; ++i) {
+            const auto frame = read_until(stream, is_item);
+            const double since_ms = static_cast<double>(frame.time.ns - pulse.time.ns) * 1e-6;
+            REQUIRE(std::abs(std::remainder(since_ms * (1 + skew) - camera * 10.0, 50.0)) < 0.1);
+        }
+    }
+    CHECK(stack.wait_for_status(followed)["board"]["late_outputs"] == 0);
+    CHECK(judge_running(stack, 2).ok);
+}
+
+TEST_CASE("end to end: a board whose sync pulses do not come says so, and waits") {
+    Stack stack({"nosync", 74, 1, 20, "", "", ""});
+    {
+        std::ofstream file(stack.configuration_path(), std::ios::app);
+        file << "[ports]\ninputs = [\"sync\"]\nfollow_sync = true\n";
+    }
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["board"]["sync"] == "awaited" && s["cameras"][0]["state"] == "streaming";
+    });
+    CHECK_THAT(status["board"]["hint"].template get<std::string>(),
+               Catch::Contains("sync input: if none come, check the cable"));
+    CHECK(status["health"] != "ok");
+    CHECK(status["cameras"][0]["frames_received"] == 0);
+}
+
 TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie at those seconds") {
     Stack stack({"gnss", 72, 1, 20, "", "[board]\ngnss = true\n", ""});
     {

@@ -191,6 +191,7 @@ class LinkListener final : public BoardListener {
     std::function<void()> synchronised = [] {};
     std::pair<std::uint8_t, std::uint8_t> changes;  ///< the newest
     std::vector<std::uint64_t> ticks;               ///< of camera 0; the link's thread adds to it
+    std::vector<std::int64_t> triggers_ns;          ///< the same
     void board_restarted() override { count(&Counts::restarted); }
     void board_synchronised() override { synchronised(); }
     void board_connected() override { count(&Counts::connected); }
@@ -200,7 +201,10 @@ class LinkListener final : public BoardListener {
     }
     void board_lost() override { count(&Counts::lost); }
     void exposure(const wire::Exposure& record, HostTime /*received*/) override {
-        if (record.camera == 0) ticks.push_back(record.tick);
+        if (record.camera == 0) {
+            ticks.push_back(record.tick);
+            triggers_ns.push_back(record.trigger_ns);
+        }
         count(&Counts::exposures);
     }
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
@@ -338,6 +342,18 @@ class NativeStream final : public ByteStream {
     }
     std::string port() const override { return "native"; }
 
+    /// At so many whole tenths of a second of its clock, from the next one on.
+    void pulse_sync(unsigned count) {
+        constexpr firmware::Nanoseconds tenth = 100'000'000;
+        const auto input =
+            static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_sync});
+        const std::lock_guard lock(mutex_);
+        for (auto at = (board_now() / tenth + 1) * tenth; count > 0; at += tenth, --count) {
+            board_->schedule_edge({at, input, true});
+            board_->schedule_edge({at + tenth / 10, input, false});
+        }
+    }
+
     /// A new life, that the link does not report.
     void boot() {
         const std::lock_guard lock(mutex_);
@@ -467,6 +483,45 @@ TEST_CASE("board_link: settings of one camera change while another is triggered"
     REQUIRE(listener.ticks.size() > 20);
     for (std::size_t i = 1; i < listener.ticks.size(); ++i)
         CHECK(listener.ticks[i] == listener.ticks[i - 1] + 1);
+}
+
+TEST_CASE("board_link: cameras that follow another board begin with its pulse, until told not to") {
+    LinkClock clock;
+    LinkListener listener;
+    std::atomic<NativeStream*> board{nullptr};
+    Configuration configuration = two_cameras(50);
+    configuration.ports.inputs = {"sync"};
+    configuration.ports.follow_sync = true;
+    configuration.ports.sync_rate_hz = 10;
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            auto made = std::make_unique<NativeStream>();
+            board = made.get();
+            return made;
+        },
+        configuration, 10, clock.translator, clock.recorder, listener);
+    link.start();
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
+    CHECK(link.report().awaits_sync);
+    link.start_cameras(0b11, pairing::Start::steady);
+    board.load()->pulse_sync(1000);
+    REQUIRE(listener.wait(&LinkListener::Counts::exposures, 20));
+    CHECK_FALSE(link.report().awaits_sync);
+    // Stopped and started, they are on the same grid, without another pulse.
+    link.stop_cameras(0b11);
+    link.start_cameras(0b11, pairing::Start::steady);
+    const unsigned before = listener.counts().exposures;
+    REQUIRE(listener.wait(&LinkListener::Counts::exposures, before + 20));
+    for (std::size_t i = 1; i < listener.ticks.size(); ++i)
+        REQUIRE(listener.ticks[i] > listener.ticks[i - 1]);
+    const auto ahead_ns = static_cast<std::int64_t>(configuration.cameras[0].exposure_us * 1e3 / 2);
+    for (const std::int64_t at : listener.triggers_ns) REQUIRE((at + ahead_ns) % 20'000'000 == 0);
+    // Nothing that the board is told of differs, and all the same its grid begins anew.
+    configuration.ports.follow_sync = false;
+    link.reconfigure(configuration);
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 2));
+    CHECK_FALSE(link.report().awaits_sync);
+    link.stop();
 }
 
 TEST_CASE("board_link: a board that cannot change single cameras is greeted anew") {

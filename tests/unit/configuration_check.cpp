@@ -410,6 +410,12 @@ TEST_CASE("configuration_check: board, clock, light and ports use what is there"
          {"[ports]\nnmea = true\n",
           "6:8: 'nmea' labels the pulses of the PPS input, which is not enabled; add \"pps\" to "
           "'inputs'"},
+         {"[ports]\nfollow_sync = true\n",
+          "6:15: 'follow_sync' needs the pulses of the sync input, which is not enabled; add "
+          "\"sync\" to 'inputs'"},
+         {"[clock]\nalign = true\n[ports]\ninputs = ['sync']\nfollow_sync = true\n",
+          "9:15: the grid cannot follow sync pulses and, by 'align' of [clock], the output clock; "
+          "remove one of the two keys"},
          {"[ports]\ninputs = ['gps']\n",
           "6:10: 'gps' is not an input; use any of: pps, aux0, aux1, sync"},
          {"[ports]\nfalling = ['aux0']\n",

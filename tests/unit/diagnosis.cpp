@@ -116,6 +116,9 @@ TEST_CASE("diagnosis: a board that runs has remarks, and no fault, for sync and 
     CHECK_THAT(bench.board().hint, Contains("do not fit the grid") && Contains("'sync_rate_hz'"));
     CHECK(bench.board().health == Health::ok);
     CHECK(bench.board().fault == Fault::none);
+    bench.status.board.awaits_sync = true;
+    CHECK_THAT(bench.board().hint, Contains("begin with pulses") && Contains("'sync_rate_hz'"));
+    CHECK(bench.board().fault == Fault::none);
     bench.status.board.unkept = true;
     CHECK_THAT(bench.board().hint, Contains("keep_configuration = false"));
     bench.status.board.hint = "what comes first";

@@ -253,6 +253,8 @@ TEST_CASE("status: pulses of the sync input, glitches and repeated samples") {
         CHECK(document["board"]["glitches"] == 12);
         CHECK(document["imus"][0]["repeated"] == 3);
     }
+    status.board.awaits_sync = true;
+    CHECK(nlohmann::json::parse(to_json(status))["board"]["sync"] == "awaited");
 }
 
 TEST_CASE("status: sigma of a clock that is not known is no number, least of all zero") {
