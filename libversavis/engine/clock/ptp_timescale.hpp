@@ -57,8 +57,8 @@ class PtpTimescale {
     static constexpr Duration widest_reading = milliseconds(2);
 
     /// Nor does one that took longer than that and so many times as long as the shortest of its
-    /// clock's newest ones: a busy host takes its time now and then, and a clock that is off by less
-    /// would pass.
+    /// clock's newest ones: a busy host takes its time now and then, and a clock that is off by
+    /// less would pass.
     static constexpr Duration short_reading = microseconds(200);
     static constexpr std::int64_t widest_of_shortest = 2;
     static constexpr std::size_t newest_readings = 50;
