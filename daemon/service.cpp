@@ -165,7 +165,8 @@ void Service::reconfigure(const Configuration& configuration) {
     configuration_ = configuration;
     // First the cameras: they are started as soon as the board has their settings.
     cameras_->reconfigure(configuration.cameras);
-    if (std::memcmp(&old_board, &new_board, sizeof new_board) != 0) {
+    if (std::memcmp(&old_board, &new_board, sizeof new_board) != 0 ||
+        before.ports.follow_sync != after.ports.follow_sync) {
         alignment_.reconfigure(new_board);
         board_->reconfigure(after);
     }

@@ -143,9 +143,7 @@ void BoardLink::set_state(BoardState state, const std::string& hint) {
 
 BoardReport BoardLink::report() const {
     const std::lock_guard lock(report_mutex_);
-    BoardReport report = report_;
-    report.awaits_sync = awaits_sync_;
-    return report;
+    return report_;
 }
 
 void BoardLink::run() {
@@ -187,10 +185,11 @@ Expected<> BoardLink::serve() {
         auto ended = converse();
         const bool was_connected = std::exchange(connected_, false);
         accepting_ = false;
+        await_sync(false);
         forget_commands();
         if (was_connected) listener_.board_lost();
         // A board that does not get as far as to run is given a pause.
-        if (ended || !anew_ || !was_connected) return ended;
+        if (ended || !anew_ || report().state != BoardState::running) return ended;
         log(LogLevel::warning, "board", "{}: reconnecting", ended.error().message());
     }
 }
@@ -203,17 +202,22 @@ Expected<> BoardLink::converse() {
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;
     set_state(BoardState::running, "");
-    awaits_sync_ = file_.ports.follow_sync;
     {
         const std::lock_guard lock(command_mutex_);
         takes_commands_ = true;
     }
     listener_.board_synchronised();
     if (auto sent = send_commands(); !sent) return sent;
-    connected_ = true;
-    accept_starts();
-    listener_.board_connected();
+    if (file_.ports.follow_sync) {
+        await_sync(true);
+        if (auto sent = send(wire::Start{0, wire::start_on_sync, {}}); !sent) return sent;
+    }
     while (!stop_) {
+        if (!connected_ && !awaits_sync_) {
+            connected_ = true;
+            accept_starts();
+            listener_.board_connected();
+        }
         if (auto sent = send_commands(); !sent) return sent;
         if (host_now() >= clock_.next_request())
             if (auto sent = send(clock_.request()); !sent) return sent;
@@ -322,7 +326,7 @@ Expected<> BoardLink::change() {
 /// Returns those that were not taken before.
 std::uint8_t BoardLink::accept_starts() {
     const std::lock_guard lock(command_mutex_);
-    accepting_ = !changes_;
+    accepting_ = connected_ && !changes_;
     return accepting_ ? std::exchange(missed_starts_, 0) : 0;
 }
 
@@ -381,10 +385,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     last_packet_ = received;
     const bool used =
         use<wire::Exposure>(packet,
-                            [&](const auto& record) {
-                                awaits_sync_ = false;
-                                listener_.exposure(record, received);
-                            }) ||
+                            [&](const auto& record) { listener_.exposure(record, received); }) ||
         use<wire::ImuSample>(packet,
                              [&](const auto& sample) {
                                  if (listener_.imu_sample(sample, received))
@@ -426,6 +427,13 @@ void BoardLink::take_answer(const wire::Packet& packet) {
     if (!possible(health)) return count_impossible();
     const std::lock_guard lock(report_mutex_);
     report_.health = counters_.since_start(health);
+    if (health.sync_state != wire::SyncState::none) report_.awaits_sync = awaits_sync_ = false;
+}
+
+/// Its grid is to begin with a pulse of the sync input, before any camera is started.
+void BoardLink::await_sync(bool awaited) {
+    const std::lock_guard lock(report_mutex_);
+    report_.awaits_sync = awaits_sync_ = awaited;
 }
 
 /// The answer to ours, or one that nobody asked for: then the board begins a new life.
@@ -539,8 +547,6 @@ void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
     message.cameras = mask;
     if (how == pairing::Start::pattern) message.flags = wire::start_pattern;
     if (how == pairing::Start::slow) message.flags = wire::start_slow;
-    // Once it follows the pulses, another grid would number its ticks anew.
-    if (awaits_sync_) message.flags |= wire::start_on_sync;
     {
         const std::lock_guard lock(command_mutex_);
         // board_connected() or cameras_changed() starts what streams by then.

@@ -70,7 +70,7 @@ struct BoardReport {
     std::uint64_t impossible = 0;         ///< packets with a number, nonce or time that cannot be
     std::uint64_t dropped_bytes = 0;      ///< the service did not take them in time
     bool unkept = false;                  ///< it could not store its configuration
-    bool awaits_sync = false;             ///< cameras begin with the next sync pulse
+    bool awaits_sync = false;             ///< no camera is started before sync pulses come
     wire::Health health{};                ///< its counters began with the service
 };
 
@@ -93,8 +93,7 @@ class BoardLink {
     /// From any thread.
     void reconfigure(const Configuration& configuration);
 
-    /// Starts or stops triggering the cameras of the mask, if the board is there. Those that are to
-    /// follow another board begin with its next sync pulse. From any thread.
+    /// Starts or stops triggering the cameras of the mask, if the board is there. From any thread.
     void start_cameras(std::uint8_t mask, pairing::Start how);
     void stop_cameras(std::uint8_t mask);
 
@@ -123,6 +122,7 @@ class BoardLink {
     Expected<> configure();
     Expected<> change();
     std::uint8_t accept_starts();
+    void await_sync(bool awaited);
     Expected<> synchronise();
     Expected<> read(Duration timeout);
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
@@ -167,6 +167,7 @@ class BoardLink {
     BoardCounters counters_;
     bool greeted_ = false;
     bool connected_ = false;
+    bool awaits_sync_ = false;         ///< the grid is to begin with a sync pulse
     std::uint64_t dropped_bytes_ = 0;  ///< of this connection, reported so far
     bool anew_ = false;  ///< the board began a new life, or seems to: greet it at once
     device::Greeting greeting_;
@@ -182,8 +183,7 @@ class BoardLink {
     mutable std::mutex report_mutex_;
     BoardReport report_;
     std::atomic<bool> stop_{false};
-    std::atomic<bool> accepting_{false};    ///< configured: cameras may be started
-    std::atomic<bool> awaits_sync_{false};  ///< the grid is to begin with a sync pulse
+    std::atomic<bool> accepting_{false};  ///< configured: cameras may be started
     std::thread thread_;
 };
 

@@ -682,8 +682,11 @@ std::string board_remark(const Status& status) {
                "the sending board runs, with the same 'sync_rate_hz' as this one (without the key "
                "1 Hz is expected)";
     if (board.health.sync_state == wire::SyncState::lost)
-        return "the sync input's pulses do not fit the grid, which runs on without them: check the "
-               "cable, and that 'sync_rate_hz' matches the sending board";
+        return "the sync input's pulses do not fit the grid: if they fit each other, it goes to "
+               "them "
+               "by 0.1 % at most; else check the cable, and that 'sync_rate_hz' matches the "
+               "sending "
+               "board";
     if (firmware_outdated(status))
         return fmt::format(
             "its firmware, {}, is older than this service, {}: stop the service, "

@@ -12,6 +12,10 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Of a reading of the clock: what it cannot tell by taking longer is in sigma. Half: sigma is
+/// larger on usual networks. Twice: clocks may be off by twice as much, and sigma does not say so.
+constexpr Duration usual_width = microseconds(200);
+
 /// From a trigger to the stamp of its exposure, beyond the configured latency. Half: cameras with a
 /// slow sensor need their latency configured. Twice: exposures of less than 0.8 ms hide that their
 /// middle is stamped, and not their start.
@@ -282,9 +286,15 @@ void PtpFrames::read_clock(const clock::ClockReading& reading, clock::Agreement 
     if (agreement != clock::Agreement::agrees) return;
     if (!following_since_) following_since_ = reading.shown;
     while (!held_.empty()) {
-        const Held& first = held_.front();
+        Held& first = held_.front();
         if (reading.shown < first.exposure.start + first.exposure.length) return;
         if (first.length_may_lag) return;
+        PtpExposure& exposure = first.exposure;
+        if (reading.width() > usual_width) {
+            const std::int64_t doubt_ns = (reading.width() / 2).ns;
+            for (Duration* sigma : {&exposure.start_sigma, &exposure.middle_sigma})
+                *sigma = rounded(std::hypot(sigma->ns, doubt_ns));
+        }
         usual_delay_ = usual_delay_ + (first.exposure.start_delay - usual_delay_) / parts_to_follow;
         proved_ = locked_ = true;
         verdicts_.push_back({first.arrival, first.exposure, EventReason::none});

@@ -269,6 +269,8 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
     };
     if (configuration.clock.align && !has(capabilities, wire::capability_host_grid))
         return lacks(configuration.clock.entry, "align", "moving its grid");
+    if (configuration.ports.follow_sync && !has(capabilities, wire::capability_grid_on_sync))
+        return lacks(configuration.ports.entry, "follow_sync", "following another board");
     if (configuration.ports.nmea && !has(capabilities, wire::capability_nmea))
         return lacks(configuration.ports.entry, "nmea", "NMEA");
     if (!configuration.time_outputs.empty() && !has(capabilities, wire::capability_time_output))

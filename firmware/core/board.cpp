@@ -41,7 +41,7 @@ constexpr std::uint32_t capabilities =
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
     wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
     wire::capability_nmea | wire::capability_time_output | wire::capability_sentences |
-    wire::capability_camera_change;
+    wire::capability_camera_change | wire::capability_grid_on_sync;
 
 /// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. If lower,
 /// contacts that bounce count double.
@@ -254,6 +254,7 @@ void Board::configure(const wire::Configuration& configuration) {
     // Pulses already decided, and their exposures, end first: none is cut short, and each gets its
     // record.
     if (!some) {
+        grid_on_sync_ = false;
         sync_.stop();
         test_.stop();
     }
@@ -433,6 +434,7 @@ void Board::start(const wire::Start& start) {
     if ((start.flags & wire::start_on_sync) != 0 && !any_running()) {
         on_sync_.cameras |= cameras;
         on_sync_.flags = start.flags;
+        grid_on_sync_ = grid_on_sync_ || start.cameras == 0;
     } else {
         on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~cameras);
         start_cameras(cameras, start.flags);

@@ -116,6 +116,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
     std::uint8_t changing_ = 0;  ///< cameras that the new configuration changes; 0: all is new
     wire::Start on_sync_{};      ///< waits for a sync pulse
+    bool grid_on_sync_ = false;  ///< so does the grid, whether cameras do or not
     std::uint32_t checked_id_ = 0;
     std::uint32_t event_sequence_ = 0;
     Nanoseconds timers_ = 0;   ///< when cameras, light and outputs have something to do in any case

@@ -156,14 +156,15 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     event(wire::BoardEventKind::sync_pulse, 0, at, number, 0);
     const Nanoseconds since = at - last_sync_;
     last_sync_ = at;
-    if ((on_sync_.cameras & ~unready()) == 0) return follow_sync(at);
+    if ((on_sync_.cameras & ~unready()) == 0 && !grid_on_sync_) return follow_sync(at);
     if (!any_running()) {
         // Two edges a period apart are pulses; a single one may be anything.
         const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
         const Nanoseconds period = rate == 0 ? default_sync_period : uhz_ns / rate;
         if (since < period - period / sync_tolerance || since > period + period / sync_tolerance)
             return;
-        grid_clock_.begin(at, period);
+        grid_clock_.begin(at, period, since);
+        grid_on_sync_ = false;
         for (CameraChannel& camera : cameras_) camera.grid_began();
         begin_trains(hal_.clock.now());
     }

@@ -26,6 +26,11 @@ constexpr std::int64_t sync_slew_ppb = wire::limits::sync_slew_ppm * 1'000;
 /// reported late.
 constexpr Nanoseconds longest_silence = 10;
 
+/// In parts of 10^9: by how much more than `nominal` the sender's `since` took on this board.
+std::int64_t pace_ppb(Nanoseconds since, Nanoseconds nominal) {
+    return (since - nominal) * 1'000'000 / (nominal / 1000);
+}
+
 /// Whole seconds, to the nearest.
 Nanoseconds nearest_second(Nanoseconds at) {
     const Nanoseconds half_later = at + billion / 2;
@@ -61,9 +66,10 @@ Nanoseconds GridLine::gained(Nanoseconds since) const {
     return (high + (low >> 32) + 128) >> 8;
 }
 
-void GridClock::begin(Nanoseconds origin, Nanoseconds sync_period) {
+void GridClock::begin(Nanoseconds origin, Nanoseconds sync_period, Nanoseconds since) {
     *this = {};
-    line_ = GridLine(origin, 0, 0);
+    pace_known_ = since != 0;
+    line_ = GridLine(origin, 0, pace_known_ ? pace_ppb(since, sync_period) : 0);
     period_ = sync_period;
     newest_pulse_ = origin;
 }
@@ -87,8 +93,7 @@ GridClock::SyncPulse GridClock::sync_pulse(Nanoseconds at, bool running) {
     Nanoseconds tolerance = (periods > longest_first_gap ? period_ : nominal) / largest_pace;
     if (pace_known_) tolerance = period_ / largest_change;
     if (periods <= 0 || off > tolerance || -off > tolerance) return take_rival(at, off, running);
-    const GridLine line(at, line_.grid() + nominal,
-                        (since - nominal) * 1'000'000 / (nominal / 1000));
+    const GridLine line(at, line_.grid() + nominal, pace_ppb(since, nominal));
     const bool approaches = bend_ != no_bend && grid_time(at) < bend_;
     if (approaches)
         steer(line, sync_slew_ppb, at);
@@ -106,14 +111,14 @@ GridClock::SyncPulse GridClock::take_rival(Nanoseconds at, Nanoseconds off, bool
         fits_ = false;
         return {first ? Sync::lost : Sync::ignored, off};
     }
-    // Its pulses lie on the multiples of its period that are nearest.
-    const Nanoseconds nominal = candidate_.periods() * period_;
-    const std::int64_t pace = (at - candidate_.first() - nominal) * 1'000'000 / (nominal / 1000);
-    const Nanoseconds half_later = grid_time(at) + period_ / 2;
-    const Nanoseconds past = half_later % period_;
-    const Nanoseconds nearest = half_later - (past < 0 ? past + period_ : past);
-    const Nanoseconds moves = at - board_time(nearest);
-    const GridLine line(at, nearest, pace);
+    // Its pulses lie on the multiples of its period that are nearest, or next: ticks that have been
+    // do not come again.
+    const std::int64_t pace = pace_ppb(at - candidate_.first(), candidate_.periods() * period_);
+    const Nanoseconds later = grid_time(at) + (running ? period_ / 2 : period_ - 1);
+    const Nanoseconds past = later % period_;
+    const Nanoseconds multiple = later - (past < 0 ? past + period_ : past);
+    const Nanoseconds moves = at - board_time(multiple);
+    const GridLine line(at, multiple, pace);
     if (running) {
         steer(line, sync_slew_ppb, at);
     } else {
@@ -129,7 +134,8 @@ GridClock::SyncPulse GridClock::take_rival(Nanoseconds at, Nanoseconds off, bool
 wire::SyncState GridClock::sync_state(Nanoseconds now) const {
     if (period_ == 0) return wire::SyncState::none;
     const bool silent = now - newest_pulse_ > longest_silence * period_;
-    return silent || !fits_ ? wire::SyncState::lost : wire::SyncState::followed;
+    const bool approaches = bend_ != no_bend && grid_time(now) < bend_;
+    return silent || !fits_ || approaches ? wire::SyncState::lost : wire::SyncState::followed;
 }
 
 /// From `now` on the grid goes to `target`, at no more than `max_slew_ppb` beyond its pace. What is

@@ -45,8 +45,8 @@ class GridLine {
 class GridClock {
  public:
     /// Grid time 0 is at `origin`; `sync_period` by the sender's clock; 0: unknown, pulses are not
-    /// followed.
-    void begin(Nanoseconds origin, Nanoseconds sync_period);
+    /// followed. `since`: from the pulse before the one at `origin`; 0: the pace is not known yet.
+    void begin(Nanoseconds origin, Nanoseconds sync_period, Nanoseconds since = 0);
 
     Nanoseconds board_time(Nanoseconds grid_time) const;
 
@@ -66,7 +66,7 @@ class GridClock {
     /// `running`: cameras run, and the grid must not step.
     SyncPulse sync_pulse(Nanoseconds at, bool running);
 
-    /// lost, too: no pulse came for a while.
+    /// lost, too: no pulse came for a while, or the grid is still on its way to the pulses.
     wire::SyncState sync_state(Nanoseconds now) const;
 
     /// A whole second of grid time belongs at `second`, and from there on board time passes faster

@@ -36,10 +36,14 @@ Unexpected<> not_handed(const std::filesystem::path& path) {
                    "does it hang? see its log ('journalctl -u versavisd')");
 }
 
-/// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.
+/// The descriptor that came with a byte, which says nothing; none: errno says why.
 FileDescriptor receive(int connection) {
+    char byte = 0;  // read all the same: without it QEMU's user mode hands over no descriptor
+    iovec data{&byte, sizeof byte};
     alignas(cmsghdr) char room[CMSG_SPACE(sizeof(int))]{};
     msghdr message{};
+    message.msg_iov = &data;
+    message.msg_iovlen = 1;
     message.msg_control = room;
     message.msg_controllen = CMSG_LEN(sizeof(int));  // a second descriptor does not come in
     if (::recvmsg(connection, &message, MSG_CMSG_CLOEXEC) < 0) return {};

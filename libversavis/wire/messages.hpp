@@ -51,6 +51,7 @@ enum Capability : std::uint32_t {
     capability_time_output = 1U << 10U,    ///< it sends pulses and NMEA sentences itself
     capability_sentences = 1U << 11U,      ///< it hands on what a GNSS receiver at the UART sends
     capability_camera_change = 1U << 12U,  ///< it takes configuration_cameras
+    capability_grid_on_sync = 1U << 13U,   ///< the grid begins with sync pulses before any camera
 };
 
 /// What a board has pins and peripherals for.

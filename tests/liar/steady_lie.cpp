@@ -147,7 +147,8 @@ std::vector<SteadyLie> make_list() {
             offset(who, ns, seconds(5));
         for (const std::int64_t ns : {ms, -50 * ms}) offset(who, ns, milliseconds(200));
         for (const std::int64_t ns : {-ms / 5, 5 * ms}) offset(who, ns, seconds(1));
-        for (const std::int64_t ns : {ms, -ms}) offset(who, ns, seconds(60));
+        for (const std::int64_t ns : {ms / 5, -ms / 5, ms, -ms, 5 * ms, -5 * ms})
+            offset(who, ns, seconds(60));
         whole_period(who, 1);
         whole_period(who, -1);
         drift(who, 300 * us, seconds(10));

@@ -111,7 +111,7 @@ TEST_CASE("board: its hello names the port, the firmware and this life") {
     CHECK(hello.minor == wire::protocol_minor);
     CHECK(hello.cameras == 3);
     CHECK(hello.reset_cause == wire::ResetCause::watchdog);
-    CHECK(hello.capabilities == 0x1FFF);
+    CHECK(hello.capabilities == 0x3FFF);
     CHECK(hello.board_time_ns == 7 * second);
     CHECK(hello.present == port.facts.present);
     CHECK(hello.fastest_imu_millihertz == 1'234);

@@ -274,6 +274,7 @@ TEST_CASE("board: cameras that wait for a sync pulse wait no longer in a new con
     Cameras bench(1);
     bench.configure();
     bench.send(wire::Start{1, wire::start_on_sync, {}});
+    bench.send(wire::Start{0, wire::start_on_sync, {}});
     bench.configure();
     for (const Nanoseconds at : {second, 2 * second}) {
         bench.run(at);
@@ -281,6 +282,24 @@ TEST_CASE("board: cameras that wait for a sync pulse wait no longer in a new con
     }
     bench.run(3 * second);
     CHECK(bench.pulsed() == 0);
+    CHECK(bench.health().sync_state == wire::SyncState::none);
+}
+
+TEST_CASE("board: the grid begins with a sync pulse though no camera waits for it") {
+    Cameras bench(1);
+    bench.configuration.ports.sync_rate_uhz = 10'000'000;
+    bench.configure();
+    bench.send(wire::Start{0, wire::start_on_sync, {}});
+    for (const Nanoseconds at : {103 * ms, 203 * ms}) {
+        bench.run(at);
+        bench.edge(input_pulse + unsigned{wire::pulse_sync}, at);
+    }
+    bench.run(210 * ms);
+    bench.send(wire::Start{1, 0, {}});
+    bench.run(500 * ms);
+    REQUIRE(bench.pulses(0).size() > 3);
+    for (const Nanoseconds at : bench.pulses(0)) CHECK((at + 2 * ms - 203 * ms) % (50 * ms) == 0);
+    CHECK(bench.health().sync_state == wire::SyncState::followed);
 }
 
 TEST_CASE("board: cameras that wait for a sync pulse are started, or stopped, by their bits") {

@@ -391,8 +391,8 @@ TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the sec
                 CHECK((bench.trigger() > 0) == (off < 0));
                 if (off > 0) continue;
                 bench.run(next + 60 * ms);
-                // The grid begins with the pulse.
-                CHECK(bench.trigger() == next + 50 * ms - 2 * ms);
+                // The grid begins with the pulse, at the sender's pace.
+                CHECK(bench.trigger() == next + 50 * ms + sign * 25 * us - 2 * ms);
                 break;
             }
             if (off != 0) continue;
@@ -410,7 +410,7 @@ TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the sec
         bench.poll(at + 10 * us);
     }
     bench.run(1'260 * ms);
-    CHECK(bench.trigger() == 1'248 * ms + 500 * us);
+    CHECK(bench.trigger() == 1'248 * ms + 525 * us);
 }
 
 TEST_CASE("board_inputs: a camera that waits for a sync pulse joins those that run at once") {
@@ -435,17 +435,17 @@ TEST_CASE("board_inputs: what is on the grid goes on from a sync pulse") {
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
     bench.send(wire::Start{1, wire::start_on_sync, {}});
-    for (const Nanoseconds at : {203 * ms, 303 * ms, 403 * ms + 10 * us}) {
+    for (const Nanoseconds at : {203 * ms, 303 * ms + 10 * us, 403 * ms + 20 * us}) {
         bench.run(at);
         bench.edge(sync_in, at);
         bench.poll(at + 10 * us);
     }
     bench.run(460 * ms);
-    // The sender's clock is slower by 100 ppm, as is known from the third pulse on.
-    CHECK(bench.trigger() == 453 * ms + 15 * us - 2 * ms);
+    // The sender's clock is slower by 100 ppm, as is known from the second pulse on.
+    CHECK(bench.trigger() == 453 * ms + 25 * us - 2 * ms);
     bool synced = false;
     for (const auto& [at, levels] : bench.port.words)
-        synced = synced || (at == 403 * ms && (levels >> output_sync & 1U) != 0);
+        synced = synced || (at == 403 * ms + 20 * us && (levels >> output_sync & 1U) != 0);
     CHECK(synced);
 }
 

@@ -485,7 +485,8 @@ TEST_CASE("board_link: settings of one camera change while another is triggered"
         CHECK(listener.ticks[i] == listener.ticks[i - 1] + 1);
 }
 
-TEST_CASE("board_link: cameras that follow another board begin with its pulse, until told not to") {
+TEST_CASE(
+    "board_link: cameras that follow another board begin after its pulses, until told not to") {
     LinkClock clock;
     LinkListener listener;
     std::atomic<NativeStream*> board{nullptr};
@@ -500,13 +501,15 @@ TEST_CASE("board_link: cameras that follow another board begin with its pulse, u
             return made;
         },
         configuration, 10, clock.translator, clock.recorder, listener);
+    listener.synchronised = [&] {
+        if (configuration.ports.follow_sync) board.load()->pulse_sync(1000);
+    };
     link.start();
     REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
-    CHECK(link.report().awaits_sync);
-    link.start_cameras(0b11, pairing::Start::steady);
-    board.load()->pulse_sync(1000);
-    REQUIRE(listener.wait(&LinkListener::Counts::exposures, 20));
     CHECK_FALSE(link.report().awaits_sync);
+    CHECK(link.report().health.sync_state == wire::SyncState::followed);
+    link.start_cameras(0b11, pairing::Start::steady);
+    REQUIRE(listener.wait(&LinkListener::Counts::exposures, 20));
     // Stopped and started, they are on the same grid, without another pulse.
     link.stop_cameras(0b11);
     link.start_cameras(0b11, pairing::Start::steady);
@@ -520,7 +523,6 @@ TEST_CASE("board_link: cameras that follow another board begin with its pulse, u
     configuration.ports.follow_sync = false;
     link.reconfigure(configuration);
     REQUIRE(listener.wait(&LinkListener::Counts::connected, 2));
-    CHECK_FALSE(link.report().awaits_sync);
     link.stop();
 }
 

@@ -187,10 +187,12 @@ TEST_CASE("grid_clock: a sender that went on at another pace, or began anew, is 
     CHECK(taken.what == Sync::taken);
     const Nanoseconds there = (clock.grid_time(pulse(3)) + second / 2) / second * second;
     if (!running) CHECK(std::abs(clock.board_time(there) - pulse(3)) < 10);
-    CHECK(clock.sync_state(pulse(2)) == versavis::wire::SyncState::followed);
+    CHECK(clock.sync_state(pulse(2)) ==
+          (running ? versavis::wire::SyncState::lost : versavis::wire::SyncState::followed));
     if (running) CHECK(std::abs(clock.board_time(clock.grid_time(pulse(2))) - before) < 4'000);
     for (int n = 3; n < 400; ++n) REQUIRE(follows(clock, pulse(n)));
     // There, at last: its pulses lie on whole seconds.
+    CHECK(clock.sync_state(pulse(400)) == versavis::wire::SyncState::followed);
     const Nanoseconds whole = (clock.grid_time(pulse(400)) + second / 2) / second * second;
     CHECK(std::abs(clock.board_time(whole) - pulse(400)) < 10);
 }
@@ -309,20 +311,21 @@ TEST_CASE("grid_clock: a sender that was just taken must be kept, like any other
     GridClock clock;
     clock.begin(5 * second, second);
     for (int n = 0; n < 3; ++n) clock.sync_pulse((6 + n) * second + 300'000'000, false);
-    CHECK(clock.board_time(3 * second) == 8 * second + 300'000'000);
+    CHECK(clock.board_time(4 * second) == 8 * second + 300'000'000);
     CHECK(clock.sync_pulse(9 * second + 300'200'000, false).what == GridClock::Sync::lost);
     CHECK(follows(clock, 10 * second + 300'000'000));
 }
 
-TEST_CASE("grid_clock: it goes to the pulses of a new sender by the shortest way") {
+TEST_CASE("grid_clock: it goes to a new sender by the shortest way, or onwards where none runs") {
+    const bool running = GENERATE(false, true);
     for (const Nanoseconds phase : {100, 400, 499, 500, 501, 600, 900}) {
         GridClock clock;
         clock.begin(5 * second, second);
         GridClock::SyncPulse pulse;
         for (int n = 0; n < 3; ++n)
-            pulse = clock.sync_pulse((8 + n) * second + phase * 1'000'000, false);
+            pulse = clock.sync_pulse((8 + n) * second + phase * 1'000'000, running);
         CHECK(pulse.what == GridClock::Sync::taken);
-        CHECK(pulse.off == (phase < 500 ? phase : phase - 1000) * 1'000'000);
+        CHECK(pulse.off == (running && phase < 500 ? phase : phase - 1000) * 1'000'000);
     }
 }
 

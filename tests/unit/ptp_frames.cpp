@@ -128,6 +128,22 @@ TEST_CASE("ptp_frames: a frame is proved by the next reading of the clock, and n
     CHECK(verdicts[0].exposure->middle_sigma.ns == 0);
 }
 
+TEST_CASE("ptp_frames: what a reading that took long cannot tell is in sigma") {
+    for (const Duration width : {microseconds(200), microseconds(1600)}) {
+        PtpCamera bench;
+        bench.frame(bench.trigger());
+        clock::ClockReading reading = reading_at(bench.now);
+        reading.before = bench.now - width / 2;
+        reading.after = bench.now + width / 2;
+        bench.frames.read_clock(reading, Agreement::agrees);
+        const auto verdicts = bench.frames.take_verdicts();
+        REQUIRE(verdicts.size() == 1);
+        const Duration sigma = width > microseconds(200) ? width / 2 : Duration{};
+        CHECK(verdicts[0].exposure->middle_sigma == sigma);
+        CHECK(verdicts[0].exposure->start_sigma == sigma);
+    }
+}
+
 TEST_CASE("ptp_frames: no frame is proved by a reading from before its end") {
     PtpCamera bench;
     const PtpTrigger trigger = bench.trigger();

@@ -69,40 +69,19 @@ TEST_CASE("ptp_timescale: the estimate is as good as it says") {
         PtpTimescale timescale;
         const std::size_t clock = timescale.add_clock();
         settle(network, timescale, clock);
-        int agreeing = 0;
         for (int i = 0; i < 200; ++i) {
-            const Agreement agreement = timescale.add(clock, network.read());
+            const ClockReading reading = network.read();
+            const Agreement agreement = timescale.add(clock, reading);
             REQUIRE(agreement != Agreement::differs);
-            agreeing += agreement == Agreement::agrees ? 1 : 0;
+            REQUIRE((agreement == Agreement::agrees) ==
+                    (reading.width() <= PtpTimescale::widest_reading));
             const auto estimate = timescale.to_host(network.ptp(network.now));
             REQUIRE(absolute(estimate->time - network.now) < estimate->sigma * 6);
             REQUIRE(estimate->sigma < microseconds(60));
             const CameraTime inverse = *timescale.at(network.now);
             REQUIRE(absolute(timescale.to_host(inverse)->time - network.now).ns <= 2);
         }
-        CHECK(agreeing > 170);
         CHECK(timescale.steps() == 0);
-    }
-}
-
-TEST_CASE("ptp_timescale: a clock that is off by more than its short readings take never agrees") {
-    for (const Duration off : {microseconds(400), microseconds(-400)}) {
-        Network network(9);
-        PtpTimescale timescale;
-        const std::size_t good = timescale.add_clock();
-        const std::size_t bad = timescale.add_clock();
-        for (int i = 0; i < 60; ++i) {
-            timescale.add(good, network.read());
-            timescale.add(bad, network.read());
-        }
-        int unknown = 0;
-        for (int i = 0; i < 2000; ++i) {
-            timescale.add(good, network.read());
-            const Agreement agreement = timescale.add(bad, network.read(off));
-            REQUIRE(agreement != Agreement::agrees);
-            unknown += agreement == Agreement::unknown ? 1 : 0;
-        }
-        CHECK(unknown > 20);  // they took so long that they fit
     }
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/clock/ptp_timescale.hpp"
 
-#include <algorithm>
-
 namespace versavis::clock {
 
 namespace {
@@ -29,46 +27,35 @@ Exchange exchange_of(const ClockReading& reading) {
 }  // namespace
 
 std::size_t PtpTimescale::add_clock() {
-    clocks_.emplace_back();
-    return clocks_.size() - 1;
+    agreed_.emplace_back();
+    return agreed_.size() - 1;
 }
 
 bool PtpTimescale::confirmed_by_another(std::size_t clock, HostTime now) const {
-    for (std::size_t other = 0; other < clocks_.size(); ++other) {
-        const auto& agreed = clocks_[other].agreed;
-        if (other != clock && agreed && now - *agreed < witness_memory) return true;
-    }
+    for (std::size_t other = 0; other < agreed_.size(); ++other)
+        if (other != clock && agreed_[other] && now - *agreed_[other] < witness_memory) return true;
     return false;
-}
-
-bool PtpTimescale::Clock::proves(const ClockReading& reading) const {
-    const Duration shortest = *std::min_element(widths.begin(), widths.end());
-    return reading.width() <=
-           std::clamp(shortest * widest_of_shortest, short_reading, widest_reading);
 }
 
 Agreement PtpTimescale::add(std::size_t clock, const ClockReading& reading) {
     if (reading.width().ns <= 0 || !possible(reading.shown)) return Agreement::unknown;
-    Clock& read = clocks_[clock];
-    read.widths.push_back(reading.width());
-    if (read.widths.size() > newest_readings) read.widths.pop_front();
     if (filter_.confirmed()) {
         const HostEstimate estimate = filter_.translate(far(reading.shown));
         const Duration tolerance = rounded(bound_sigmas * static_cast<double>(estimate.sigma.ns));
         const bool differs =
             estimate.time + tolerance < reading.before || estimate.time - tolerance > reading.after;
-        if (differs) read.agreed.reset();
+        if (differs) agreed_[clock].reset();
         if (differs && confirmed_by_another(clock, reading.after)) return Agreement::differs;
         const std::uint64_t restarts = filter_.restarts();
         filter_.add(exchange_of(reading));
         if (filter_.restarts() != restarts) {
             ++steps_;
             leader_.reset();
-            for (Clock& each : clocks_) each.agreed.reset();
+            for (auto& agreed : agreed_) agreed.reset();
         }
         if (differs || filter_.contradicted()) return Agreement::differs;
-        if (!read.proves(reading)) return Agreement::unknown;
-        read.agreed = reading.after;
+        if (reading.width() > widest_reading) return Agreement::unknown;
+        agreed_[clock] = reading.after;
         return Agreement::agrees;
     }
     if (leads(clock, reading.after)) filter_.add(exchange_of(reading));
@@ -84,7 +71,7 @@ bool PtpTimescale::leads(std::size_t clock, HostTime now) {
 }
 
 void PtpTimescale::forget(std::size_t clock) {
-    clocks_[clock].agreed.reset();
+    agreed_[clock].reset();
     if (leader_ == clock) leader_.reset();
 }
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <vector>
 
@@ -24,7 +23,7 @@ struct ClockReading {
 
 /// Of a reading with what all readings say together.
 enum class Agreement {
-    unknown,  ///< nothing is known yet, or the reading took too long to tell
+    unknown,  ///< nothing is known yet, or the reading is too wide to tell
     agrees,
     differs,  ///< the clock shows another time
 };
@@ -56,27 +55,13 @@ class PtpTimescale {
     /// may be off by twice as much before that shows.
     static constexpr Duration widest_reading = milliseconds(2);
 
-    /// Nor does one that took longer than that and so many times as long as the shortest of its
-    /// clock's newest ones: a busy host takes its time now and then, and a clock that is off by
-    /// less would pass.
-    static constexpr Duration short_reading = microseconds(200);
-    static constexpr std::int64_t widest_of_shortest = 2;
-    static constexpr std::size_t newest_readings = 50;
-
  private:
-    struct Clock {
-        std::optional<HostTime> agreed;  ///< when it did last
-        std::deque<Duration> widths;     ///< of the newest readings
-
-        bool proves(const ClockReading& reading) const;
-    };
-
     bool confirmed_by_another(std::size_t clock, HostTime now) const;
     bool leads(std::size_t clock, HostTime now);
 
     EnvelopeFilter filter_;
-    std::vector<Clock> clocks_;
-    std::optional<std::size_t> leader_;  ///< the clock that a new estimate begins with
+    std::vector<std::optional<HostTime>> agreed_;  ///< by clock: when it did last
+    std::optional<std::size_t> leader_;            ///< the clock that a new estimate begins with
     HostTime leader_read_;
     std::uint64_t steps_ = 0;
 };
