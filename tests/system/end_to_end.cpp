@@ -419,9 +419,10 @@ TEST_CASE("end to end: cameras of a board that follows another expose with its p
 
 TEST_CASE("end to end: a board whose sync pulses do not come says so, and waits") {
     Stack stack({"nosync", 74, 1, 20, "", "", ""});
+    const std::string follow = "follow_sync = true\n";
     {
         std::ofstream file(stack.configuration_path(), std::ios::app);
-        file << "[ports]\ninputs = [\"sync\"]\nfollow_sync = true\n";
+        file << "[ports]\ninputs = [\"sync\"]\n" << follow;
     }
     stack.start_rig();
     stack.start_service();
@@ -432,6 +433,11 @@ TEST_CASE("end to end: a board whose sync pulses do not come says so, and waits"
                Catch::Contains("sync input: if none come, check the cable"));
     CHECK(status["health"] != "ok");
     CHECK(status["cameras"][0]["frames_received"] == 0);
+    const auto size = std::filesystem::file_size(stack.configuration_path());
+    std::filesystem::resize_file(stack.configuration_path(), size - follow.size());
+    stack.service().signal(SIGHUP);
+    CHECK(stack.wait_for_status(healthy)["board"]["sync"] == "none");
+    CHECK(judge_running(stack, 2).ok);
 }
 
 TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie at those seconds") {
