@@ -416,7 +416,7 @@ TEST_CASE_METHOD(CApi, "c_api: root is an owner, too") {
     CHECK_THAT(error.message, Catch::Contains("not to user 0"));
 }
 
-TEST_CASE_METHOD(CApi, "c_api: where memory is short, that is what is reported") {
+TEST_CASE_METHOD(CApi, "c_api: where memory is short, that is what is reported", "[kernel]") {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     return;  // there, a program ends that asks for too much
 #elif defined(__has_feature)

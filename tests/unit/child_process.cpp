@@ -64,7 +64,7 @@ TEST_CASE("child_process: takes signals, and its end is seen before it is waited
     process->send(SIGTERM);  // to nobody
 }
 
-TEST_CASE("child_process: programs are installed together") {
+TEST_CASE("child_process: programs are installed together", "[kernel]") {
     CHECK(std::filesystem::exists(installed_program("unit_tests")));
     CHECK_FALSE(std::filesystem::exists(installed_program("no_such_program")));
 }

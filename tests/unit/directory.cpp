@@ -45,7 +45,7 @@ TEST_CASE("directory: one owner at a time, readable for its group, whatever the 
     CHECK(OwnedDirectory::claim(path));
 }
 
-TEST_CASE("directory: another service is found by its rings, too, and named") {
+TEST_CASE("directory: another service is found by its rings, too, and named", "[kernel]") {
     test::TemporaryDirectory parent("/dev/shm");
     const auto path = parent.path() / "instance";
     int ready[2];

@@ -90,7 +90,7 @@ TEST_CASE_METHOD(FutexWords, "futex: each of several words wakes who waits for a
         }
 }
 
-TEST_CASE_METHOD(FutexWords, "futex: a word that has changed before costs no sleep") {
+TEST_CASE_METHOD(FutexWords, "futex: a word that has changed before costs no sleep", "[kernel]") {
     auto changed = first(2);
     ++words[1];
     const long before = sleeps_of_this_thread();

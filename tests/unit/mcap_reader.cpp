@@ -184,7 +184,8 @@ TEST_CASE("mcap_reader: chunks of lz4 and zstd are read, and a bad one costs onl
     }
 }
 
-TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory than they have") {
+TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory than they have",
+          "[kernel]") {
     const ReaderSample sample;
     const std::string whole[] = {test::sample_recording(1, false, false, mono8),
                                  test::sample_recording(1, true, false, mono8),

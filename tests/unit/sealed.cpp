@@ -118,7 +118,7 @@ std::ptrdiff_t open_file_count() {
 
 }  // namespace
 
-TEST_CASE_METHOD(SealedInstance, "sealed: read as any other stream, by its name", "[kernel]") {
+TEST_CASE_METHOD(SealedInstance, "sealed: read as any other stream, by its name") {
     const auto before = open_file_count();
     {
         Writer writer = write();
@@ -188,7 +188,7 @@ TEST_CASE_METHOD(SealedInstance,
     CHECK_THAT(refusal(only), Catch::Contains("is not sealed; set 'sealed = true'"));
 }
 
-TEST_CASE_METHOD(SealedInstance, "sealed: readers follow to whatever takes its name", "[kernel]") {
+TEST_CASE_METHOD(SealedInstance, "sealed: readers follow to whatever takes its name") {
     const bool to_sealed = GENERATE(true, false);
     const bool from_sealed = GENERATE(true, false);
     CAPTURE(from_sealed, to_sealed);
@@ -206,8 +206,8 @@ TEST_CASE_METHOD(SealedInstance, "sealed: readers follow to whatever takes its n
     CHECK(test::look(reader->next()).time.ns == 2);
 }
 
-TEST_CASE_METHOD(SealedInstance, "sealed: of a service that was killed, the name is known for dead",
-                 "[kernel]") {
+TEST_CASE_METHOD(SealedInstance,
+                 "sealed: of a service that was killed, the name is known for dead") {
     REQUIRE(in_process([&]() -> bool {
         const auto owned = OwnedDirectory::claim(directory.path() / "instance");
         auto writer = Writer::create({owned->path(), true}, {"frames", StreamKind::events, 8});

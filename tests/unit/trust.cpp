@@ -65,8 +65,7 @@ TEST_CASE_METHOD(TrustedInstance, "trust: a missing permission is named, with th
     }
 }
 
-TEST_CASE_METHOD(TrustedInstance, "trust: root's streams are read by everybody whom modes let",
-                 "[kernel]") {
+TEST_CASE_METHOD(TrustedInstance, "trust: root's streams are read by everybody whom modes let") {
     if (!is_root()) return;
     // To know the name is enough, where the directory is not to be listed.
     for (const mode_t mode : {0755U, 0711U}) {
@@ -76,8 +75,7 @@ TEST_CASE_METHOD(TrustedInstance, "trust: root's streams are read by everybody w
     }
 }
 
-TEST_CASE_METHOD(TrustedInstance, "trust: a directory that a stranger made first is not trusted",
-                 "[kernel]") {
+TEST_CASE_METHOD(TrustedInstance, "trust: a directory that a stranger made first is not trusted") {
     if (!is_root()) return;
     const std::string cure =
         "; if the service runs as that user, give its name or number in VERSAVIS_OWNER, or as "

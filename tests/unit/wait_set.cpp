@@ -203,7 +203,7 @@ TEST_CASE_METHOD(TwoStreams, "wait_set: its descriptor is readable until nothing
 TEST_CASE_METHOD(WaitStreams,
                  "wait_set: a reader's own descriptor reports items, ends and restarts "
                  "[threads]",
-                 "[threads][kernel]") {
+                 "[threads]") {
     auto first = std::make_unique<Writer>(writer("a"));
     Reader of_a = reader("a");
     const auto descriptor = of_a.fd();
