@@ -120,9 +120,10 @@ void CameraGroup::board_changed(std::uint8_t outputs) {
     }
 }
 
-std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostTime received) {
+std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostTime received,
+                                             std::optional<BoardTime> expected) {
     const Unit* unit = at_output(record.camera);
-    return unit != nullptr ? unit->pipeline->add(record, received) : std::nullopt;
+    return unit != nullptr ? unit->pipeline->add(record, received, expected) : std::nullopt;
 }
 
 void CameraGroup::auxiliary_pulse(unsigned input, BoardTime at) {

@@ -51,7 +51,8 @@ class CameraGroup {
     void board_changed(std::uint8_t outputs);
 
     /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
-    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
+    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received,
+                                    std::optional<BoardTime> expected = std::nullopt);
 
     /// A pulse at an auxiliary input of the board.
     void auxiliary_pulse(unsigned input, BoardTime at);

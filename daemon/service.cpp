@@ -196,10 +196,16 @@ void Service::board_restarted() {
     cameras_->board_restarted();
 }
 
+void Service::board_configured(const wire::ConfigurationAnswer& answer) {
+    grid_.configured(answer);
+    grid_life_ = translator_.contact().life;
+}
+
 /// Before any camera starts: then its first exposure lies on the grid already.
 void Service::board_synchronised() {
     asymmetry_.use(board_->report().port);
     ticks_.grid_began(host_now());
+    grid_life_ = translator_.contact().life;
     alignment_.begin();
     time_announcer_.begin();
     announce(host_now());
@@ -234,7 +240,8 @@ void Service::announce(HostTime now) {
 void Service::exposure(const wire::Exposure& record, HostTime received) {
     wire::Exposure numbered = record;
     numbered.tick = ticks_.number(record.camera, record.tick);
-    const auto stamp = cameras_->add(numbered, received);
+    if (translator_.contact().life != grid_life_) grid_.forget();  // its time is another's
+    const auto stamp = cameras_->add(numbered, received, grid_.trigger(record.camera, record.tick));
     if (stamp) alignment_.exposure(record, stamp->output, received);
 }
 

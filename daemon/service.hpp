@@ -12,6 +12,7 @@
 #include "board/grid_alignment.hpp"
 #include "board/tick_numbers.hpp"
 #include "board/time_announcer.hpp"
+#include "board/trigger_grid.hpp"
 #include "camera_group.hpp"
 #include "control/control.hpp"
 #include "engine/ring/directory.hpp"
@@ -76,6 +77,7 @@ class Service final : public Controlled, private BoardListener {
 
     // On the link's thread.
     void board_restarted() override;
+    void board_configured(const wire::ConfigurationAnswer& answer) override;
     void board_synchronised() override;
     void board_connected() override;
     void cameras_changed(std::uint8_t outputs, std::uint8_t other_rate) override;
@@ -96,7 +98,9 @@ class Service final : public Controlled, private BoardListener {
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     TimeAnnouncer time_announcer_;
-    TickNumbers ticks_;  ///< of the link's thread
+    TickNumbers ticks_;            ///< of the link's thread
+    TriggerGrid grid_;             ///< the same
+    std::uint32_t grid_life_ = 0;  ///< of the estimate of the clock that it is of
     std::unique_ptr<EventJournal> events_;
     EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;

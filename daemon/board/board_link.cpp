@@ -281,7 +281,10 @@ Expected<> BoardLink::configure() {
     if (auto done = read_until(answered, answer_timeout, "does not answer the configuration");
         !done)
         return done;
-    if (answer_.status == wire::ConfigurationStatus::taken) return {};
+    if (answer_.status == wire::ConfigurationStatus::taken) {
+        listener_.board_configured(answer_);
+        return {};
+    }
     if (answer_.status == wire::ConfigurationStatus::running &&
         (configuration_.flags & wire::configuration_cameras) != 0) {
         anew_ = true;

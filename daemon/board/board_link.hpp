@@ -34,6 +34,8 @@ class BoardListener {
     virtual ~BoardListener() = default;
     virtual void
     board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
+    /// Also when settings of cameras alone were changed.
+    virtual void board_configured(const wire::ConfigurationAnswer& /*answer*/) {}
     virtual void board_synchronised() = 0;  ///< its clock is known; no camera can be started yet
     virtual void board_connected() = 0;     ///< configured, its clock known: cameras may be started
     /// Cameras of these outputs were stopped and have other settings, `other_rate` another rate;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "board/trigger_grid.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::daemon {
@@ -68,9 +69,8 @@ void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, Ho
     const std::lock_guard lock(mutex_);
     const wire::CameraConfiguration& camera = board_.cameras[record.camera];
     if (camera.rate_uhz == 0) return;
-    const auto since_first = static_cast<std::int64_t>(static_cast<__int128>(record.tick) *
-                                                       1'000'000'000'000'000 / camera.rate_uhz);
-    const std::int64_t first_tick = middle.ns - camera.phase_ns - since_first;
+    const std::int64_t first_tick =
+        middle.ns - camera.phase_ns - until_tick(record.tick, camera.rate_uhz).ns;
     errors_.push_back({now, {past_nearest_second_ns(first_tick)}});
     if (errors_.size() > errors_kept) errors_.pop_front();
 }

@@ -230,10 +230,11 @@ void CameraPipeline::set_sensor_state(const SensorState& state) {
     sensor_ = state;
 }
 
-std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received) {
+std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received,
+                                                std::optional<BoardTime> expected) {
     const std::lock_guard lock(mutex_);
     report_.last_record = received;
-    if (const auto doubted = doubt(record, received)) {
+    if (const auto doubted = doubt(record, received, expected)) {
         count_rejected(record, *doubted);
         return std::nullopt;
     }
@@ -258,12 +259,13 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     return stamp;
 }
 
-std::optional<Implausibility> CameraPipeline::doubt(const wire::Exposure& record,
-                                                    HostTime received) {
+std::optional<Implausibility> CameraPipeline::doubt(const wire::Exposure& record, HostTime received,
+                                                    std::optional<BoardTime> expected) {
     const clock::ClockContact contact = translator_.contact();
     follow_clock(contact.life);
     pairing::ReceivedRecord judged{record, check_.reported_at(received), contact.exchanges};
     judged.clock_contradicted = contact.contradicted;
+    if (expected) judged.grid_ns = expected->ns;
     judged.promptness = Promptness::unknown;
     const auto arrival = arrival_delay(pairing::newest_instant(record), received, translator_);
     if (arrival) judged.promptness = delays_.of(arrival->delay, arrival->sigma);

@@ -115,7 +115,8 @@ class CameraPipeline final : private pairing::Outcome {
 
     /// The stamp of the exposure's middle; none: board time cannot be translated yet, or the record
     /// is doubted.
-    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
+    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received,
+                                    std::optional<BoardTime> expected = std::nullopt);
 
     /// By the camera's message channel.
     void add(const CameraEvent& event);
@@ -191,7 +192,8 @@ class CameraPipeline final : private pairing::Outcome {
     void restart_pairing();
     void forget_records();
     void pair_without_clock();
-    std::optional<Implausibility> doubt(const wire::Exposure& record, HostTime received);
+    std::optional<Implausibility> doubt(const wire::Exposure& record, HostTime received,
+                                        std::optional<BoardTime> expected);
     void count_rejected(const wire::Exposure& record, const Implausibility& doubt);
     void adopt_step(const wire::Exposure& record, const Implausibility& doubt);
     void follow_clock(std::uint32_t life);

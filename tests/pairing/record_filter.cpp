@@ -3,6 +3,7 @@
 
 #include <rapidcheck.h>
 #include <catch2/catch.hpp>
+#include <functional>
 
 using namespace versavis;
 using namespace versavis::pairing;
@@ -275,14 +276,20 @@ struct SteppedCamera {
         limits.fixed_grid = true;
         return limits;
     }
-    bool believes(Duration off, Promptness promptness) {
+    ReceivedRecord received(Duration off, Promptness promptness) {
         ReceivedRecord received;
         ++tick;
         received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), tick, off);
         received.promptness = promptness;
         received.exchanges = tick;
-        return !filter.judge(received).doubt;
+        if (grid) received.grid_ns = grid(received.record, off);
+        return received;
     }
+    bool believes(Duration off, Promptness promptness) {
+        return !filter.judge(received(off, promptness)).doubt;
+    }
+
+    std::function<std::int64_t(const wire::Exposure& record, Duration off)> grid;
 
     RecordFilter filter{limits()};
     std::uint64_t tick = 0;
@@ -307,6 +314,49 @@ TEST_CASE("record_filter: a step is believed when its delay confirms it, or noth
     while (!bench.believes(off, promptness) && records < 1000) ++records;
     INFO(off.ns << " ns, " << static_cast<int>(promptness));
     CHECK(records == believed_after);
+}
+
+TEST_CASE("record_filter: what the board said of its grid before decides a step of its triggers") {
+    // Half of the exposure that is expected, 4 ms, is taken off the grid point.
+    const auto grid = [](Duration moved) {
+        return [moved](const wire::Exposure& record, Duration off) {
+            return record.trigger_ns - off.ns + 2'000'000 + moved.ns;
+        };
+    };
+    struct Step {
+        Duration off;
+        Duration grid;  ///< off what records said before
+        Promptness promptness;
+        std::uint64_t believed_after;
+    };
+    constexpr std::uint64_t at_last = most_to_prevail + 1;
+    const auto [off, moved, promptness, believed_after] =
+        GENERATE(Step{microseconds(200), {}, Promptness::usual, at_last},
+                 Step{-microseconds(200), {}, Promptness::late, at_last},
+                 Step{milliseconds(1), {}, Promptness::usual, at_last},
+                 Step{microseconds(200), microseconds(200), Promptness::usual, 5},
+                 Step{-microseconds(200), -microseconds(200), Promptness::late, 5},
+                 Step{milliseconds(1), milliseconds(1), Promptness::early, 5},
+                 Step{milliseconds(1), milliseconds(3), Promptness::usual, at_last});
+    SteppedCamera bench;
+    bench.grid = grid(moved);
+    std::uint64_t records = 1;
+    while (!bench.believes(off, promptness) && records < 2000) ++records;
+    INFO(off.ns << " ns, grid " << moved.ns);
+    CHECK(records == believed_after);
+}
+
+TEST_CASE("record_filter: a start that leaves its trigger is not confirmed by the grid") {
+    SteppedCamera bench;
+    bench.grid = [](const wire::Exposure& record, Duration) {
+        return record.trigger_ns + 2'000'000;
+    };
+    for (int i = 0; i < 60; ++i) {
+        ReceivedRecord received = bench.received({}, Promptness::unknown);
+        received.record.start_ns += 200'000;
+        received.record.end_ns += 200'000;
+        CHECK(bench.filter.judge(received).doubt);
+    }
 }
 
 TEST_CASE("record_filter: usual delays among more early ones do not confirm a step") {

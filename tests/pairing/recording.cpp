@@ -83,6 +83,8 @@ TEST_CASE("recording: evidence comes back from an item of the ring as it was") {
     received.expected_ns = 6;
     received.arrival = EventReason::too_old;
     received.clock_contradicted = true;
+    received.grid_ns = 8;
+    CHECK(there_and_back(received).grid_ns == 8);
     CHECK(there_and_back(received).record.flags == wire::exposure_late);
     CHECK(there_and_back(received).record.end_ns == 5);
     CHECK(there_and_back(received).commanded == milliseconds(3));

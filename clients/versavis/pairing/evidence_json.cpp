@@ -92,7 +92,8 @@ json describe(const ReceivedRecord& received) {
             {"expected_ns", received.expected_ns},
             {"arrival", static_cast<std::uint32_t>(received.arrival)},
             {"clock_contradicted", received.clock_contradicted},
-            {"promptness", static_cast<std::uint32_t>(received.promptness)}};
+            {"promptness", static_cast<std::uint32_t>(received.promptness)},
+            {"grid_ns", received.grid_ns}};
 }
 
 json describe(const TriggersSkipped& skipped) {
@@ -166,6 +167,7 @@ ReceivedRecord received_record(const json& line) {
     received.arrival = static_cast<EventReason>(line.at("arrival").get<std::uint32_t>());
     received.clock_contradicted = line.at("clock_contradicted");
     received.promptness = static_cast<Promptness>(line.value("promptness", std::uint8_t{0}));
+    received.grid_ns = line.value("grid_ns", std::int64_t{0});
     return received;
 }
 

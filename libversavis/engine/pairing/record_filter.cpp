@@ -184,6 +184,15 @@ RecordHistory::GridPoint RecordHistory::by_trigger(const wire::Exposure& record)
     return {record.tick, trigger + expected.shortest / 2, trigger + expected.longest / 2};
 }
 
+std::optional<bool> RecordHistory::on_grid(const ReceivedRecord& received) const {
+    const wire::Exposure& record = received.record;
+    if (!fixed_grid_ || received.grid_ns == 0 || !trigger_doubt(record)) return std::nullopt;
+    const GridPoint said = by_trigger(record);
+    const BoardTime point{received.grid_ns};
+    const Duration late = has(record, wire::exposure_late) ? latest_trigger : Duration{};
+    return said.earliest - late - grid_tolerance <= point && point <= said.latest + grid_tolerance;
+}
+
 /// What is known gets narrower, and never moves.
 void RecordHistory::learn_grid(const wire::Exposure& record) {
     if (!fixed_grid_ || has(record, wire::exposure_late)) return;
@@ -314,6 +323,9 @@ RecordVerdict RecordFilter::judge(const ReceivedRecord& received) {
 
 bool RecordFilter::may_adopt(const ReceivedRecord& received, const Implausibility& doubt) {
     if (received.promptness == Promptness::not_recorded) return filter_.stepped(received.exchanges);
+    if (const auto on_grid = filter_.believed().on_grid(received))
+        return *on_grid ? filter_.stepped(received.exchanges)
+                        : filter_.prevailed(received.exchanges, most_to_prevail);
     const bool confirmed =
         doubt.reason == EventReason::implausible_number
             ? filter_.believed().only_skips(received.record)

@@ -38,6 +38,9 @@ struct ReceivedRecord {
     EventReason arrival = EventReason::none;  ///< what contradicts the time of its arrival
     bool clock_contradicted = false;          ///< exchanges contradict the estimate of the clock
     Promptness promptness = Promptness::not_recorded;
+    /// Where the trigger lies by what the board said of its grid before, if no exposure is expected
+    /// of it; 0: unknown.
+    std::int64_t grid_ns = 0;
 };
 
 /// The newest instant that the record names.
@@ -77,6 +80,10 @@ class RecordHistory {
 
     /// The board said that so many of the next grid points have no trigger.
     void triggers_skipped(std::uint64_t count) { skips_ += count; }
+
+    /// By what the board said of its grid before: the grid point is where it should be. None: that
+    /// is unknown, or the record's trigger is not what is doubted.
+    std::optional<bool> on_grid(const ReceivedRecord& received) const;
 
     /// The newest one was of the same trigger, and said the same.
     bool repeats(const ReceivedRecord& received) const;

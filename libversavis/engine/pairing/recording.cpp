@@ -35,7 +35,8 @@ static_assert(offsetof(ReceivedRecord, commanded) == 48 &&
               offsetof(ReceivedRecord, expected_ns) == 64 &&
               offsetof(ReceivedRecord, arrival) == 72 &&
               offsetof(ReceivedRecord, clock_contradicted) == 76 &&
-              offsetof(ReceivedRecord, promptness) == 77);
+              offsetof(ReceivedRecord, promptness) == 77 &&
+              offsetof(ReceivedRecord, grid_ns) == 80);
 
 /// A bool is 0 or 1, whatever byte somebody stored.
 template <class Item, std::size_t size>
@@ -122,6 +123,7 @@ const char* impossible(const ReceivedRecord& received) {
     if (!possible_or_unknown(received.record.start_ns)) return "start_ns";
     if (!possible_or_unknown(received.record.end_ns)) return "end_ns";
     if (received.promptness > Promptness::late) return "promptness";
+    if (!possible(BoardTime{received.grid_ns})) return "grid_ns";
     return is_length(received.commanded) ? nullptr : "commanded_ns";
 }
 

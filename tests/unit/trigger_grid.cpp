@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/trigger_grid.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+TEST_CASE("trigger_grid: triggers lie on the board's grid, less their latency, without drift") {
+    TriggerGrid grid;
+    CHECK_FALSE(grid.trigger(0, 1));
+    wire::ConfigurationAnswer answer{};
+    answer.origin_ns = 5'000'000'000;
+    answer.taken.cameras[1].rate_uhz = 30'000'000;
+    answer.taken.cameras[1].phase_ns = 70'000;
+    answer.taken.cameras[1].latency_ns = 20'000;
+    grid.configured(answer);
+    CHECK(grid.trigger(1, 0) == BoardTime{5'000'050'000});
+    CHECK(grid.trigger(1, 1) == BoardTime{5'033'383'333});
+    // 30 Hz after a day: no rounding has added up.
+    CHECK(grid.trigger(1, 30ULL * 86'400) == BoardTime{86'405'000'050'000});
+    CHECK_FALSE(grid.trigger(0, 1));  // it is not used
+    CHECK_FALSE(grid.trigger(wire::camera_count, 1));
+    CHECK_FALSE(grid.trigger(1, UINT64_MAX));
+    grid.forget();
+    CHECK_FALSE(grid.trigger(1, 0));
+}
