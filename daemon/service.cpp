@@ -191,6 +191,7 @@ Service::~Service() {
 
 /// Before the clock is: no record of the old life may be translated by the new clock.
 void Service::board_restarted() {
+    grid_.forget();
     for (auto& imu : imus_) imu->board_restarted();
     nmea_.board_restarted();
     cameras_->board_restarted();
@@ -198,14 +199,12 @@ void Service::board_restarted() {
 
 void Service::board_configured(const wire::ConfigurationAnswer& answer) {
     grid_.configured(answer);
-    grid_life_ = translator_.contact().life;
 }
 
 /// Before any camera starts: then its first exposure lies on the grid already.
 void Service::board_synchronised() {
     asymmetry_.use(board_->report().port);
     ticks_.grid_began(host_now());
-    grid_life_ = translator_.contact().life;
     alignment_.begin();
     time_announcer_.begin();
     announce(host_now());
@@ -240,7 +239,6 @@ void Service::announce(HostTime now) {
 void Service::exposure(const wire::Exposure& record, HostTime received) {
     wire::Exposure numbered = record;
     numbered.tick = ticks_.number(record.camera, record.tick);
-    if (translator_.contact().life != grid_life_) grid_.forget();  // its time is another's
     const auto stamp = cameras_->add(numbered, received, grid_.trigger(record.camera, record.tick));
     if (stamp) alignment_.exposure(record, stamp->output, received);
 }

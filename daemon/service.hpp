@@ -98,9 +98,8 @@ class Service final : public Controlled, private BoardListener {
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     TimeAnnouncer time_announcer_;
-    TickNumbers ticks_;            ///< of the link's thread
-    TriggerGrid grid_;             ///< the same
-    std::uint32_t grid_life_ = 0;  ///< of the estimate of the clock that it is of
+    TickNumbers ticks_;  ///< of the link's thread
+    TriggerGrid grid_;   ///< the same
     std::unique_ptr<EventJournal> events_;
     EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;

@@ -70,7 +70,8 @@ void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, Ho
     const wire::CameraConfiguration& camera = board_.cameras[record.camera];
     if (camera.rate_uhz == 0) return;
     const std::int64_t first_tick =
-        middle.ns - camera.phase_ns - until_tick(record.tick, camera.rate_uhz).ns;
+        middle.ns - camera.phase_ns -
+        static_cast<std::int64_t>(until_tick(record.tick, camera.rate_uhz));
     errors_.push_back({now, {past_nearest_second_ns(first_tick)}});
     if (errors_.size() > errors_kept) errors_.pop_front();
 }

@@ -11,10 +11,10 @@
 namespace versavis::daemon {
 
 /// From a grid's origin to a tick, as the board counts them, without drift.
-inline Duration until_tick(std::uint64_t tick, std::uint32_t rate_uhz) {
-    __extension__ using Wide = __int128;
-    constexpr Wide femtohertz = 1'000'000'000'000'000;
-    return {static_cast<std::int64_t>(static_cast<Wide>(tick) * femtohertz / rate_uhz)};
+__extension__ using WideNanoseconds = __int128;
+inline WideNanoseconds until_tick(std::uint64_t tick, std::uint32_t rate_uhz) {
+    constexpr WideNanoseconds scale = 1'000'000'000'000'000;  // of ns and micro-hertz
+    return static_cast<WideNanoseconds>(tick) * scale / rate_uhz;
 }
 
 /// By the answer to the configuration, which holds while nothing moves the grid: a second witness
@@ -27,17 +27,18 @@ class TriggerGrid {
     /// When the trigger of this tick leaves, if no exposure is expected of it: half of what is
     /// expected is taken off that. None: nothing is known of it.
     std::optional<BoardTime> trigger(unsigned camera, std::uint64_t tick) const {
-        if (!answer_ || camera >= wire::camera_count || tick > furthest_tick) return std::nullopt;
+        if (!answer_ || camera >= wire::camera_count) return std::nullopt;
         const wire::CameraConfiguration& taken = answer_->taken.cameras[camera];
         if (taken.rate_uhz == 0) return std::nullopt;
-        const Duration after = until_tick(tick, taken.rate_uhz) +
-                               Duration{std::int64_t{taken.phase_ns} - taken.latency_ns};
-        return BoardTime{answer_->origin_ns} + after;
+        const WideNanoseconds at = until_tick(tick, taken.rate_uhz) + answer_->origin_ns +
+                                   taken.phase_ns - taken.latency_ns;
+        if (at <= 0 || at > latest_ns) return std::nullopt;
+        return BoardTime{static_cast<std::int64_t>(at)};
     }
 
  private:
-    /// 31 years at 1 kHz; later ones are no ticks.
-    static constexpr std::uint64_t furthest_tick = std::uint64_t{1} << 40U;
+    /// 36 years after the board's start: what a false tick or origin leads to is no instant.
+    static constexpr WideNanoseconds latest_ns = std::int64_t{1} << 60U;
 
     std::optional<wire::ConfigurationAnswer> answer_;
 };

@@ -337,13 +337,26 @@ TEST_CASE("record_filter: what the board said of its grid before decides a step 
                  Step{microseconds(200), microseconds(200), Promptness::usual, 5},
                  Step{-microseconds(200), -microseconds(200), Promptness::late, 5},
                  Step{milliseconds(1), milliseconds(1), Promptness::early, 5},
-                 Step{milliseconds(1), milliseconds(3), Promptness::usual, at_last});
+                 // It is refuted itself.
+                 Step{milliseconds(1), milliseconds(3), Promptness::usual, 5},
+                 Step{microseconds(200), milliseconds(3), Promptness::usual, 97});
     SteppedCamera bench;
     bench.grid = grid(moved);
     std::uint64_t records = 1;
     while (!bench.believes(off, promptness) && records < 2000) ++records;
     INFO(off.ns << " ns, grid " << moved.ns);
     CHECK(records == believed_after);
+}
+
+TEST_CASE("record_filter: a record that may lie anywhere is not confirmed by the grid") {
+    SteppedCamera bench;
+    bench.grid = [](const wire::Exposure& record, Duration off) {
+        return record.trigger_ns - off.ns + 2'000'000;
+    };
+    for (int i = 0; i < 30; ++i) {
+        if (i == 5) ++bench.tick;  // one is missing: another exposure may have been expected
+        CHECK_FALSE(bench.believes(microseconds(200), Promptness::usual));
+    }
 }
 
 TEST_CASE("record_filter: a start that leaves its trigger is not confirmed by the grid") {

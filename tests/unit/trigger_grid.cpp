@@ -21,7 +21,14 @@ TEST_CASE("trigger_grid: triggers lie on the board's grid, less their latency, w
     CHECK(grid.trigger(1, 30ULL * 86'400) == BoardTime{86'405'000'050'000});
     CHECK_FALSE(grid.trigger(0, 1));  // it is not used
     CHECK_FALSE(grid.trigger(wire::camera_count, 1));
-    CHECK_FALSE(grid.trigger(1, UINT64_MAX));
+    for (const std::uint64_t tick : {std::uint64_t{1} << 38U, std::uint64_t{276'701'161'105},
+                                     std::uint64_t{1} << 40U, UINT64_MAX})
+        CHECK_FALSE(grid.trigger(1, tick));
+    for (const std::int64_t origin : {INT64_MIN, std::int64_t{-1} << 60U, INT64_MAX}) {
+        answer.origin_ns = origin;
+        grid.configured(answer);
+        CHECK_FALSE(grid.trigger(1, 7));
+    }
     grid.forget();
     CHECK_FALSE(grid.trigger(1, 0));
 }

@@ -187,10 +187,18 @@ RecordHistory::GridPoint RecordHistory::by_trigger(const wire::Exposure& record)
 std::optional<bool> RecordHistory::on_grid(const ReceivedRecord& received) const {
     const wire::Exposure& record = received.record;
     if (!fixed_grid_ || received.grid_ns == 0 || !trigger_doubt(record)) return std::nullopt;
-    const GridPoint said = by_trigger(record);
-    const BoardTime point{received.grid_ns};
+    const auto kept = grid_ ? predicted(record.tick) : std::nullopt;
+    if (!kept) return std::nullopt;
+    const auto is_at = [&](const GridPoint& point, Duration late) {
+        const BoardTime named{received.grid_ns};
+        return point.earliest - late - grid_tolerance <= named &&
+               named <= point.latest + grid_tolerance;
+    };
     const Duration late = has(record, wire::exposure_late) ? latest_trigger : Duration{};
-    return said.earliest - late - grid_tolerance <= point && point <= said.latest + grid_tolerance;
+    const bool said = is_at(by_trigger(record), late);
+    // What both fit, or neither, does not tell them apart.
+    if (said == is_at(*kept, {})) return std::nullopt;
+    return said;
 }
 
 /// What is known gets narrower, and never moves.

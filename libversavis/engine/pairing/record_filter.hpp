@@ -81,8 +81,9 @@ class RecordHistory {
     /// The board said that so many of the next grid points have no trigger.
     void triggers_skipped(std::uint64_t count) { skips_ += count; }
 
-    /// By what the board said of its grid before: the grid point is where it should be. None: that
-    /// is unknown, or the record's trigger is not what is doubted.
+    /// By what the board said of its grid before: the record's grid point is where it should be,
+    /// and not that of the records before; false: the reverse. None: that is unknown, decides
+    /// nothing, or the record's trigger is not what is doubted.
     std::optional<bool> on_grid(const ReceivedRecord& received) const;
 
     /// The newest one was of the same trigger, and said the same.
