@@ -391,11 +391,8 @@ TEST_CASE("end to end: cameras of a board that follows another expose with its p
     StackSettings settings{
         "sync", 73, 2, 20, "exposure_us = 3000", "[board]\nsync_hz = 2\nsync_skew_ppm = 40\n", ""};
     settings.extras = {"", "phase_us = 10000"};
+    settings.imu_extra = "[ports]\ninputs = [\"sync\"]\nfollow_sync = true\nsync_rate_hz = 2\n";
     Stack stack(settings);
-    {
-        std::ofstream file(stack.configuration_path(), std::ios::app);
-        file << "[ports]\ninputs = [\"sync\"]\nfollow_sync = true\nsync_rate_hz = 2\n";
-    }
     stack.start_rig();
     stack.start_service();
     const auto followed = [](const auto& s) {
