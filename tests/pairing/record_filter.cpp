@@ -348,6 +348,29 @@ TEST_CASE("record_filter: what the board said of its grid before decides a step 
     CHECK(records == believed_after);
 }
 
+TEST_CASE("record_filter: a missing record does not let the next one lie elsewhere") {
+    SteppedCamera bench;
+    const auto off = GENERATE(microseconds(200), -microseconds(200), milliseconds(1));
+    for (const int missing : {1, 3, 30}) {
+        bench.tick += missing;
+        CHECK_FALSE(bench.believes(off, Promptness::usual));
+        CHECK(bench.believes({}, Promptness::usual));
+    }
+}
+
+TEST_CASE("record_filter: after a missing record, another exposure costs one record at most") {
+    SteppedCamera bench;
+    ++bench.tick;
+    ReceivedRecord received = bench.received({}, Promptness::usual);
+    received.record = record(bench.tick, milliseconds(12), milliseconds(15));
+    CHECK(bench.filter.judge(received).doubt);
+    for (int i = 0; i < 10; ++i) {
+        received = bench.received({}, Promptness::usual);
+        received.record = record(bench.tick, milliseconds(12), milliseconds(12));
+        CHECK_FALSE(bench.filter.judge(received).doubt);
+    }
+}
+
 TEST_CASE("record_filter: a record that may lie anywhere is not confirmed by the grid") {
     SteppedCamera bench;
     bench.grid = [](const wire::Exposure& record, Duration off) {

@@ -147,7 +147,9 @@ std::optional<Implausibility> RecordHistory::trigger_doubt(const wire::Exposure&
 }
 
 std::optional<Implausibility> RecordHistory::grid_doubt(const wire::Exposure& record) const {
-    const GridPoint said = by_trigger(record);
+    // An exposure that no record names may have been expected of the first triggers alone: after a
+    // gap, one record too many is doubted rather than one too few.
+    const GridPoint said = by_trigger(record, length_count_ > remembered_lengths);
     const auto grid = predicted(record.tick);
     Implausibility doubt{EventReason::implausible_time, record.trigger_ns, record.trigger_ns};
     if (!grid) return doubt;
@@ -170,12 +172,17 @@ std::optional<RecordHistory::GridPoint> RecordHistory::predicted(std::uint64_t t
     return GridPoint{tick, grid_->earliest + moved - rounding, grid_->latest + moved + rounding};
 }
 
+bool RecordHistory::all_seen(const wire::Exposure& record) const {
+    return length_count_ > remembered_lengths &&
+           (record.trigger == seen_ + 1 || commanded_.ns != 0);
+}
+
 /// The board sends a trigger half the exposure that it expects before the grid point.
-RecordHistory::GridPoint RecordHistory::by_trigger(const wire::Exposure& record) const {
+RecordHistory::GridPoint RecordHistory::by_trigger(const wire::Exposure& record,
+                                                   bool exposures_known) const {
     Lengths expected = lengths(record);
-    const bool all_seen =
-        length_count_ > remembered_lengths && (record.trigger == seen_ + 1 || commanded_.ns != 0);
-    if (!all_seen) expected = {expected.shortest / unseen_change, expected.longest * unseen_change};
+    if (!exposures_known)
+        expected = {expected.shortest / unseen_change, expected.longest * unseen_change};
     if (has(record, wire::exposure_announced)) {
         expected.shortest = expected.shortest - announced_difference;
         expected.longest = expected.longest + announced_difference;
@@ -195,7 +202,7 @@ std::optional<bool> RecordHistory::on_grid(const ReceivedRecord& received) const
                named <= point.latest + grid_tolerance;
     };
     const Duration late = has(record, wire::exposure_late) ? latest_trigger : Duration{};
-    const bool said = is_at(by_trigger(record), late);
+    const bool said = is_at(by_trigger(record, all_seen(record)), late);
     // What both fit, or neither, does not tell them apart.
     if (said == is_at(*kept, {})) return std::nullopt;
     return said;
@@ -204,7 +211,7 @@ std::optional<bool> RecordHistory::on_grid(const ReceivedRecord& received) const
 /// What is known gets narrower, and never moves.
 void RecordHistory::learn_grid(const wire::Exposure& record) {
     if (!fixed_grid_ || has(record, wire::exposure_late)) return;
-    const GridPoint said = by_trigger(record);
+    const GridPoint said = by_trigger(record, all_seen(record));
     const auto grid = grid_ ? predicted(record.tick) : std::nullopt;
     grid_ = said;
     if (!grid) return;

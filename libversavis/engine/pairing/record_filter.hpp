@@ -121,7 +121,8 @@ class RecordHistory {
     std::optional<Implausibility> end_doubt(const ReceivedRecord& received) const;
     Lengths lengths(const wire::Exposure& record) const;
     Duration compensation(const wire::Exposure& record) const;
-    GridPoint by_trigger(const wire::Exposure& record) const;
+    bool all_seen(const wire::Exposure& record) const;
+    GridPoint by_trigger(const wire::Exposure& record, bool exposures_known) const;
     std::optional<GridPoint> predicted(std::uint64_t tick) const;
     void learn_grid(const wire::Exposure& record);
 
