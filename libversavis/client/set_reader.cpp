@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "client/deadline.hpp"
@@ -31,12 +30,36 @@ constexpr Duration retry_period = milliseconds(100);
 // Losses of a camera that one look bears, as in ImuWindow.
 constexpr int most_losses = 16;
 
-using Key = std::pair<std::uint32_t, std::uint64_t>;  ///< epoch and tick
+// By how much frames of two instances may differ in host time to be of one grid point: boards that
+// share sync pulses, PPS or PTP place them within some microseconds. If higher, frames of cameras
+// that are as fast as 1 kHz meet those of the grid point before.
+constexpr Duration together = microseconds(500);
+
+/// Epoch and tick; where instances are several, 0 and host time, since ticks of two boards do not
+/// compare.
+using Key = std::pair<std::uint32_t, std::uint64_t>;
+
+/// A stream, and which of the reader's instances serves it.
+struct Place {
+    std::string name;
+    std::size_t instance = 0;
+
+    friend bool operator==(const Place& a, const Place& b) {
+        return a.name == b.name && a.instance == b.instance;
+    }
+};
+
+struct Instance {
+    std::string name;
+    std::optional<std::uint64_t> life;  ///< none: none of its cameras is there yet
+};
 
 struct Pending {
     std::vector<std::optional<Frame>> frames;
     HostTime give_up;
 };
+
+bool precedes(const EpochTime& a, const EpochTime& b) { return a.precedes(b); }
 
 }  // namespace
 
@@ -51,10 +74,12 @@ bool FrameSet::valid() const {
 
 /// Not part of the interface, as its class is.
 struct [[gnu::visibility("hidden")]] SetReader::State {
-    std::vector<std::string> names;
+    std::vector<Instance> instances;
+    std::vector<Place> places;                        ///< of the cameras
     std::vector<std::optional<FrameStream>> cameras;  ///< none: not there yet
     HostTime retry;                                   ///< when those are looked for again
     std::optional<ImuWindow> imu;
+    std::size_t imu_instance = 0;
     SetOptions options;
     WaitSet waiting;
     WaitSet cameras_waiting;     ///< the IMU's samples wake nobody while no set needs them
@@ -62,23 +87,30 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::map<Key, Pending> pending;
     std::vector<std::optional<Key>> newest;  ///< of each camera
     std::optional<Key> finished;             ///< of the set before
-    std::optional<EpochTime> finished_at;    ///< latest stamp of it
-    std::optional<EpochTime> last;           ///< latest stamp of the set before
-    std::optional<std::uint64_t> life;       ///< none: no camera is there yet
+    std::optional<EpochTime> finished_at;    ///< latest stamp of it, by the instance of the IMU
+    std::optional<EpochTime> last;           ///< latest stamp of the set before, likewise
     std::vector<bool> ended;  ///< of each camera: its stream is gone, or was never there
     SetReport report;
 
-    void begin(std::uint64_t life_now);
+    bool joins() const { return instances.size() > 1; }
+    Place place(const std::string& name);
+    Key key_of(const Frame& frame) const;
+    Key after(const Key& key) const;
+    Pending& set_of(const Key& key, std::size_t camera);
+    void begin(std::size_t instance, std::uint64_t life_now);
+    StreamOptions options_of(const Place& place) const;
     Expected<> open(std::size_t camera);
     std::optional<NoItem> open_absent();
     std::optional<NoItem> collect();
     std::optional<NoItem> collect(std::size_t camera);
-    std::optional<NoItem> restarted(const NoItem& why, std::uint64_t life_now);
+    std::optional<NoItem> restarted(const NoItem& why, std::size_t instance,
+                                    std::uint64_t life_now);
     std::optional<NoItem> gone(const NoItem& why, std::size_t camera);
     bool any_ended() const;
     void add(std::size_t camera, Frame frame);
     bool is_late(const Key& key, const EpochTime& time) const;
-    std::vector<EpochTime> end(const Key& key, const Pending& set);
+    std::optional<EpochTime> end(const Key& key, const Pending& set);
+    Duration spread(const Pending& set) const;
     bool decided(const Key& key, const Pending& set) const;
     bool deliverable(const Pending& set) const;
     bool covered(const Pending& set) const;
@@ -89,22 +121,47 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::optional<HostTime> next_deadline() const;
 };
 
-/// The pause to report: a restart once for all streams.
-std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64_t life_now) {
-    if (why.why != Pause::restarted || life_now == life) return std::nullopt;
-    begin(life_now);
+/// "instance/stream", or a stream of the instance that the options name.
+Place SetReader::State::place(const std::string& name) {
+    const auto slash = name.rfind('/');
+    const bool named = slash != std::string::npos;
+    const std::string instance = named ? name.substr(0, slash) : options.instance;
+    const auto known = std::find_if(instances.begin(), instances.end(),
+                                    [&](const Instance& other) { return other.name == instance; });
+    const auto index = static_cast<std::size_t>(known - instances.begin());
+    if (known == instances.end()) instances.push_back({instance, std::nullopt});
+    return {named ? name.substr(slash + 1) : name, index};
+}
+
+Key SetReader::State::key_of(const Frame& frame) const {
+    if (joins()) return {0, static_cast<std::uint64_t>(frame.data.host_time.ns)};
+    return {frame.data.epoch, frame.data.tick()};
+}
+
+/// The last key that is of the same set as this one, or of the same grid point.
+Key SetReader::State::after(const Key& key) const {
+    return {key.first, key.second + (joins() ? static_cast<std::uint64_t>(together.ns) : 0)};
+}
+
+/// The pause to report: a restart once for all streams of an instance.
+std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::size_t instance,
+                                                  std::uint64_t life_now) {
+    if (why.why != Pause::restarted || life_now == instances[instance].life) return std::nullopt;
+    begin(instance, life_now);
     return why;
 }
 
-void SetReader::State::begin(std::uint64_t life_now) {
-    life = life_now;
+void SetReader::State::begin(std::size_t instance, std::uint64_t life_now) {
+    instances[instance].life = life_now;
     pending.clear();
-    newest.assign(cameras.size(), std::nullopt);
     finished.reset();
     finished_at.reset();
     last.reset();
-    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        if (places[camera].instance != instance) continue;
+        newest[camera].reset();
         ended[camera] = !cameras[camera];
+    }
 }
 
 /// The pause to report: the end of the first camera that ends, until one of them continues.
@@ -131,20 +188,30 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
         report.lost += frame.error().lost;
         if (frame.error().why == Pause::lost) ++losses;
         if (frame.error().why == Pause::restarted) ended[camera] = false;
-        if (auto pause = restarted(frame.error(), cameras[camera]->reader().life())) return pause;
+        if (auto pause =
+                restarted(frame.error(), places[camera].instance, cameras[camera]->reader().life()))
+            return pause;
         if (auto pause = gone(frame.error(), camera)) return pause;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
     }
     return std::nullopt;
 }
 
+StreamOptions SetReader::State::options_of(const Place& place) const {
+    StreamOptions made = options;
+    made.instance = instances[place.instance].name;
+    return made;
+}
+
 Expected<> SetReader::State::open(std::size_t camera) {
-    auto stream = FrameStream::open(names[camera], options);
+    const Place& place = places[camera];
+    auto stream = FrameStream::open(place.name, options_of(place));
     if (!stream) return Unexpected(stream.error());
     cameras[camera].emplace(std::move(*stream));
     for (WaitSet* set : {&waiting, &cameras_waiting})
         if (auto added = set->add(cameras[camera]->reader()); !added) return added;
     ended[camera] = false;
+    auto& life = instances[place.instance].life;
     if (!life) life = cameras[camera]->reader().life();
     return {};
 }
@@ -160,7 +227,8 @@ std::optional<NoItem> SetReader::State::open_absent() {
         if (!open(camera))
             retry = host_now() + retry_period;
         else if (!pause)
-            pause = restarted({Pause::restarted}, cameras[camera]->reader().life());
+            pause = restarted({Pause::restarted}, places[camera].instance,
+                              cameras[camera]->reader().life());
     }
     return pause;
 }
@@ -171,53 +239,81 @@ std::optional<NoItem> SetReader::State::collect() {
         if (auto pause = collect(camera)) return pause;
     if (!imu) return std::nullopt;
     const auto collected = imu->collect();
-    return collected ? std::nullopt : restarted(collected.error(), imu->reader().life());
+    return collected ? std::nullopt
+                     : restarted(collected.error(), imu_instance, imu->reader().life());
 }
 
 void SetReader::State::add(std::size_t camera, Frame frame) {
     const bool suspect = (frame.data.flags & flag_suspect) != 0 && !options.suspect;
     // Of another life: a camera that lags behind a restart, or is ahead of the others.
-    if (frame.data.trigger == 0 || suspect || frame.time.life != life) {
+    if (frame.data.trigger == 0 || suspect ||
+        frame.time.life != instances[places[camera].instance].life) {
         ++report.left_out;
         return;
     }
-    const Key key{frame.data.epoch, frame.data.tick()};
+    const Key key = key_of(frame);
     if (is_late(key, frame.time)) {
         ++report.left_out;
         return;
     }
     newest[camera] = std::max(newest[camera].value_or(key), key);
+    set_of(key, camera).frames[camera] = std::move(frame);
+}
+
+/// The set that the camera's frame with this key belongs to.
+Pending& SetReader::State::set_of(const Key& key, std::size_t camera) {
+    for (auto& [other, set] : pending)
+        if (after(other) >= key && after(key) >= other && !set.frames[camera]) return set;
     Pending& set = pending[key];
     if (set.frames.empty()) {
         set.frames.resize(cameras.size());
         set.give_up = deadline_after(options.patience);
     }
-    set.frames[camera] = std::move(frame);
+    return set;
 }
 
 /// Its set was given up. A camera of another rate counts its ticks apart from the others: a frame
 /// that is newer than the set before is not late, whatever its tick.
 bool SetReader::State::is_late(const Key& key, const EpochTime& time) const {
-    if (!finished || key > *finished) return false;
-    return key == *finished || !finished_at->precedes(time);
+    if (!finished || key > after(*finished)) return false;
+    return joins() || key == *finished || !finished_at->precedes(time);
 }
 
-/// No frame is added to this set any more. Returns its stamps.
-std::vector<EpochTime> SetReader::State::end(const Key& key, const Pending& set) {
-    std::vector<EpochTime> times;
-    for (const auto& frame : set.frames)
-        if (frame) times.push_back(frame->time);
+/// No frame is added to this set any more. Returns its latest stamp by the IMU's instance.
+std::optional<EpochTime> SetReader::State::end(const Key& key, const Pending& set) {
+    std::optional<EpochTime> latest;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        const auto& frame = set.frames[camera];
+        if (!frame || places[camera].instance != imu_instance) continue;
+        if (!latest || latest->precedes(frame->time)) latest = frame->time;
+    }
     finished = key;
-    finished_at = *std::max_element(times.begin(), times.end(),
-                                    [](const auto& a, const auto& b) { return a.precedes(b); });
-    return times;
+    if (latest) finished_at = latest;
+    return latest;
+}
+
+/// Stamps of two instances may be by two clocks: there, host time is what compares.
+Duration SetReader::State::spread(const Pending& set) const {
+    std::vector<EpochTime> times;
+    std::vector<HostTime> host;
+    for (const auto& frame : set.frames) {
+        if (!frame) continue;
+        times.push_back(frame->time);
+        host.push_back(frame->data.host_time);
+    }
+    if (joins()) {
+        const auto [earliest, latest] = std::minmax_element(host.begin(), host.end());
+        return *latest - *earliest;
+    }
+    const auto [earliest, latest] = std::minmax_element(times.begin(), times.end(), precedes);
+    return latest->since(*earliest).value_or(Duration{});
 }
 
 /// True when nothing more can come: each camera is there, went past it, or ended; or time is over.
 bool SetReader::State::decided(const Key& key, const Pending& set) const {
     if (pending.size() > most_pending || is_over(set.give_up)) return true;
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
-        if (!ended[camera] && newest[camera] < key) return false;
+        if (!ended[camera] && (!newest[camera] || after(*newest[camera]) < key)) return false;
     return true;
 }
 
@@ -228,22 +324,26 @@ bool SetReader::State::deliverable(const Pending& set) const {
 
 /// True when its samples are there, or are not waited for any more.
 bool SetReader::State::covered(const Pending& set) const {
-    return !imu || is_over(set.give_up) ||
-           std::all_of(set.frames.begin(), set.frames.end(),
-                       [&](const auto& frame) { return !frame || imu->reaches(frame->time); });
+    if (!imu || is_over(set.give_up)) return true;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+        const auto& frame = set.frames[camera];
+        const bool compares = frame && places[camera].instance == imu_instance;
+        if (compares && !imu->reaches(frame->time)) return false;
+    }
+    return true;
 }
 
 FrameSet SetReader::State::finish(const Key& key, Pending set) {
-    const std::vector<EpochTime> times = end(key, set);
     FrameSet made;
-    made.tick = key.second;
+    const auto latest = end(key, set);
+    made.spread = spread(set);
     made.frames = std::move(set.frames);
-    const auto earliest = std::min_element(
-        times.begin(), times.end(), [](const auto& a, const auto& b) { return a.precedes(b); });
-    made.time = times.front();
-    made.spread = finished_at->since(*earliest).value_or(Duration{});
-    if (imu) made.imu = samples_until(*finished_at);
-    last = *finished_at;
+    const auto first = std::find_if(made.frames.begin(), made.frames.end(),
+                                    [](const auto& frame) { return frame.has_value(); });
+    made.tick = (*first)->data.tick();
+    made.time = (*first)->time;
+    if (imu && latest) made.imu = samples_until(*latest);
+    if (latest) last = latest;
     ++report.sets;
     return made;
 }
@@ -302,12 +402,16 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
                                     const SetOptions& options) {
     if (cameras.empty())
         return failure(ErrorCode::invalid, "a set of frames", "needs the names of cameras");
-    if (std::set<std::string>(cameras.begin(), cameras.end()).size() != cameras.size())
-        return failure(ErrorCode::invalid, "a set of frames", "names a camera twice",
-                       "name each once");
     auto state = std::make_unique<State>();
     state->options = options;
-    state->names = cameras;
+    for (const std::string& name : cameras) {
+        const Place place = state->place(name);
+        auto& places = state->places;
+        if (std::find(places.begin(), places.end(), place) != places.end())
+            return failure(ErrorCode::invalid, "a set of frames", "names a camera twice",
+                           "name each once");
+        places.push_back(place);
+    }
     state->cameras.resize(cameras.size());
     state->newest.resize(cameras.size());
     state->ended.resize(cameras.size(), true);
@@ -324,9 +428,16 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
     }
     state->options.wait = left_until(deadline);
     if (!options.imu.empty()) {
-        auto imu = ImuWindow::open(options.imu, state->options);
+        const std::size_t known = state->instances.size();
+        const Place place = state->place(options.imu);
+        if (state->instances.size() != known)
+            return failure(ErrorCode::invalid, options.imu,
+                           "is of an instance without a camera here",
+                           "name an IMU of an instance that has one of the cameras");
+        auto imu = ImuWindow::open(place.name, state->options_of(place));
         if (!imu) return Unexpected(imu.error());
         state->imu.emplace(std::move(*imu));
+        state->imu_instance = place.instance;
     }
     state->options.wait = {};  // from here on, next() waits
     if (state->imu)

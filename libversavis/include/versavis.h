@@ -386,7 +386,7 @@ typedef struct versavis_sets_options {
     uint32_t partial; /* 1: sets that lack a frame, too; cameras may appear later */
     uint32_t suspect; /* 1: frames whose pairing is not proved count, too */
     uint32_t reserved;
-    const char *imu;                 /* name of its stream; NULL: none */
+    const char *imu;                 /* name of its stream, as a camera's; NULL: none */
     int64_t patience;                /* from a set's first frame until it is given up; 0: 200 ms */
     const versavis_options *streams; /* NULL: the defaults */
 } versavis_sets_options;
@@ -423,6 +423,8 @@ typedef struct versavis_set_report {
 #define VERSAVIS_SET_REPORT_INIT \
     {sizeof(versavis_set_report), 0, 0, 0, 0, 0, 0}
 
+/* Cameras of another instance on the same grid as "rear/cam0": frames are of one set that lie within
+ * 0.5 ms of each other in host time. */
 VERSAVIS_EXPORT int versavis_sets_open(const char *instance, const char *const *cameras,
                                        size_t count, const versavis_sets_options *options,
                                        versavis_sets **opened, versavis_error *error);

@@ -16,6 +16,7 @@
 #include "../support/look.hpp"
 #include "../support/stack.hpp"
 #include "judge.hpp"
+#include "versavis/set_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::test;
@@ -384,6 +385,39 @@ TEST_CASE("end to end: frames of an aligned board lie at whole seconds of the ou
     CHECK(std::abs(status["clock"]["grid_error_ns"].get<double>()) < 100'000);
     CHECK(status["board"]["hint"] == "");
     CHECK(judge_running(stack, 2).ok);
+}
+
+TEST_CASE("end to end: frames of two services on one grid come as sets") {
+    Stack front({"front", 75, 1, 20, "exposure_us = 3000", "", ""});
+    Stack rear({"rear", 76, 1, 20, "exposure_us = 6000", "", ""});
+    for (Stack* stack : {&front, &rear}) {
+        std::ofstream file(stack->configuration_path(), std::ios::app);
+        file << "[clock]\nalign = true\nmax_slew_ppm = 200\n";
+        file.close();
+        stack->start_rig();
+        stack->start_service();
+    }
+    for (Stack* stack : {&front, &rear})
+        stack->wait_for_status(
+            [](const auto& s) { return healthy(s) && s["clock"]["grid_aligned"] == true; });
+    SetOptions options;
+    options.imu = "front/imu0";
+    options.wait = seconds(30);
+    auto sets = SetReader::open({"front/cam0", "rear/cam0"}, options);
+    REQUIRE(sets);
+    for (int complete = 0; complete < 40;) {
+        const auto set = sets->next(seconds(30));
+        if (!set) {
+            REQUIRE(set.error().why == Pause::lost);
+            continue;
+        }
+        CHECK(set->complete());
+        CHECK(set->spread < microseconds(200));
+        CHECK_FALSE(set->frames[0]->time.since(set->frames[1]->time));
+        if (complete++ > 0) CHECK(set->imu.samples.size() >= 8);
+    }
+    CHECK(judge_running(front, 2).ok);
+    CHECK(judge_running(rear, 2).ok);
 }
 
 TEST_CASE("end to end: cameras of a board that follows another expose with its pulses") {

@@ -62,6 +62,7 @@ struct Rig {
                       std::uint32_t flags = 0, std::uint32_t epoch = 1) {
         FrameMetadata metadata{};
         metadata.set_tick(tick);
+        metadata.host_time = {time_of(tick) + late_ns};
         metadata.trigger = tick + 1;
         metadata.flags = flags;
         metadata.epoch = epoch;
@@ -691,4 +692,127 @@ TEST_CASE_METHOD(Rig, "set_reader: a newest set whose samples lag does not take 
         sample(time_of(tick));
     }
     CHECK(sets.report().skipped == 0);
+}
+
+namespace {
+
+/// Beside it, another service with one camera, on the same grid. Its ticks and its output time have
+/// another origin.
+struct TwoInstances : Rig {
+    test::TemporaryDirectory rear_directory{"/dev/shm"};
+    std::string rear = test::instance_in(rear_directory.path());
+    std::unique_ptr<ring::Writer> c = rear_camera(17);
+    std::vector<std::string> names{"a", rear + "/c"};
+
+    std::unique_ptr<ring::Writer> rear_camera(std::uint64_t life) const {
+        return std::make_unique<ring::Writer>(*ring::Writer::create(
+            rear_directory.path(), {"c", ring::StreamKind::frames, 16, 8, 4096, 0, life}));
+    }
+    /// Exposed with the others' of this tick, but for `late`.
+    static void rear_frame(ring::Writer& writer, std::uint64_t tick, Duration late = {}) {
+        FrameMetadata metadata{};
+        metadata.set_tick(tick + 1'000'000);
+        metadata.trigger = tick + 1;
+        metadata.epoch = 5;
+        metadata.host_time = {time_of(tick) + late.ns};
+        const auto slot = writer.acquire();
+        REQUIRE(slot);
+        writer.publish(*slot, 8, OutputTime{time_of(tick) - 3'600'000'000'000}, pack(metadata));
+    }
+    SetReader open_both(const SetOptions& options) const {
+        auto reader = SetReader::open(names, options);
+        REQUIRE(reader);
+        return std::move(*reader);
+    }
+};
+
+}  // namespace
+
+TEST_CASE_METHOD(TwoInstances, "set_reader: cameras of two instances meet by host time") {
+    SetReader sets = open_both(options());
+    for (const std::uint64_t tick : {7, 8}) {
+        rear_frame(*c, tick, microseconds(30));
+        CHECK(sets.next({}).error().why == Pause::nothing);
+        frame(*a, tick);
+        const auto set = sets.next({});
+        REQUIRE(set);
+        CHECK(set->complete());
+        CHECK(set->tick == tick);
+        CHECK(set->spread == microseconds(30));
+        CHECK(set->frames[1]->data.tick() == tick + 1'000'000);
+        CHECK_FALSE(set->frames[0]->time.since(set->frames[1]->time));
+    }
+}
+
+TEST_CASE_METHOD(TwoInstances, "set_reader: what two boards took apart is in no set of both") {
+    SetReader sets = open_both(options());
+    const auto late = GENERATE(milliseconds(25), -milliseconds(25), microseconds(501));
+    frame(*a, 7);
+    rear_frame(*c, 7, late);
+    frame(*a, 8);
+    rear_frame(*c, 8, late);
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    CHECK(sets.report().sets == 0);
+    CHECK(sets.report().incomplete >= 2);
+    frame(*a, 9);
+    rear_frame(*c, 9, -microseconds(500));
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->frames[0]->data.tick() == 9);
+    CHECK(set->frames[1]->data.tick() == 1'000'009);
+}
+
+TEST_CASE_METHOD(TwoInstances,
+                 "set_reader: a service that restarts does not take the other along") {
+    SetReader sets = open_both(options());
+    frame(*a, 7);
+    rear_frame(*c, 7);
+    REQUIRE(sets.next({}));
+    c = rear_camera(18);
+    rear_frame(*c, 8);
+    CHECK(sets.next({}).error().why == Pause::restarted);
+    frame(*a, 8);
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->frames[0]->data.tick() == 8);
+    CHECK(set->frames[1]->time.life == 18);
+}
+
+TEST_CASE_METHOD(TwoInstances,
+                 "set_reader: samples of one instance reach from set to set of both") {
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    with_imu.partial = true;
+    SetReader sets = open_both(with_imu);
+    const auto take = [&] {
+        sample(time_of(7 + sample_number));
+        return sets.next({});
+    };
+    frame(*a, 7);
+    rear_frame(*c, 7, microseconds(400));
+    REQUIRE(take());  // its sample is of the time of a's frame, by the output clock of a
+    rear_frame(*c, 8);
+    rear_frame(*c, 9);
+    frame(*a, 9);
+    auto set = take();  // of the rear alone
+    REQUIRE(set);
+    CHECK(set->imu.samples.empty());
+    CHECK(set->imu.gap == SpanGap::begin);
+    set = take();
+    REQUIRE(set);
+    CHECK(set->imu.complete());
+    CHECK(set->imu.samples.size() == 2);
+    CHECK(set->imu.samples.back().time.ns == set->frames[0]->time.ns);
+}
+
+TEST_CASE_METHOD(TwoInstances, "set_reader: cameras and an IMU must be of instances that fit") {
+    auto twice = SetReader::open({"a", test::instance_in(directory.path()) + "/a"}, options());
+    REQUIRE_FALSE(twice);
+    CHECK(twice.error().code == ErrorCode::invalid);
+    SetOptions with_imu = options();
+    with_imu.imu = rear + "/imu";
+    const auto elsewhere = SetReader::open({"a", "b"}, with_imu);
+    REQUIRE_FALSE(elsewhere);
+    CHECK(elsewhere.error().code == ErrorCode::invalid);
+    CHECK(elsewhere.error().message().find("without a camera") != std::string::npos);
 }

@@ -110,7 +110,8 @@ class Sets(Source):
 
 def sets(cameras, imu=None, patience=0.2, partial=False, suspect=False, instance=None,
          start="next", after_loss=None, owner=None, sealed_only=False, wait=0):
-    """Opens sets of frames of the cameras, which the board must trigger.
+    """Opens sets of frames of the cameras, which the board must trigger; those of another instance
+    as "rear/cam0".
 
     imu: name of its stream; None: none.
     patience: seconds from a set's first frame until it is given up.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Sets of frames: what all cameras saw at one tick, with the IMU samples since the set before.
+// Cameras of several services on one grid meet by host time.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +16,13 @@
 namespace versavis {
 
 struct VERSAVIS_API FrameSet {
-    std::uint64_t tick = 0;
-    EpochTime time;                            ///< of the first camera that is there
-    Duration spread;                           ///< latest less earliest stamp
+    std::uint64_t tick = 0;  ///< of the first camera that is there
+    EpochTime time;          ///< likewise
+    Duration spread;         ///< latest less earliest stamp; of several instances, in host time
     std::vector<std::optional<Frame>> frames;  ///< in the order in which cameras were named
     /// After the set before, up to the latest stamp of this one. The first set has no samples, and
-    /// the first of an epoch those of the epoch: both say that samples may be missing.
+    /// the first of an epoch those of the epoch: both say that samples may be missing. A set that
+    /// lacks all cameras of the IMU's instance has none; they are in the next one.
     ImuSpan imu;
 
     bool complete() const;
@@ -28,7 +30,7 @@ struct VERSAVIS_API FrameSet {
 };
 
 struct SetOptions : StreamOptions {
-    std::string imu;                        ///< name of its stream; empty: none
+    std::string imu;                        ///< its stream, as "imu0" or "rear/imu0"; empty: none
     Duration patience = milliseconds(200);  ///< from a set's first frame until it is given up
     /// Sets that lack a frame are delivered, too: at once, where a camera has ended. A camera that
     /// is not there yet is taken in when it appears.
@@ -47,11 +49,13 @@ struct SetReport {
 };
 
 /// Not thread-safe. Cameras must be triggered by the board; a set is of one grid point, so cameras
-/// of different rates meet where their grids do.
+/// of different rates meet where their grids do. Cameras of several instances are named with it, as
+/// "rear/cam0"; their boards share pulses or a clock. Ticks and output times of two instances do
+/// not compare: frames within 0.5 ms of each other in host time are of one set.
 class VERSAVIS_API SetReader {
  public:
     /// Errors: as for FrameStream::open and ImuStream::open; invalid: no camera named, or one
-    /// twice.
+    /// twice, or the IMU of an instance without a camera among them.
     static Expected<SetReader> open(const std::vector<std::string>& cameras,
                                     const SetOptions& options = {});
     SetReader(SetReader&&) noexcept;
