@@ -69,7 +69,7 @@ TEST_CASE("child_process: programs are installed together", "[kernel]") {
     CHECK_FALSE(std::filesystem::exists(installed_program("no_such_program")));
 }
 
-TEST_CASE("child_process: a program that is not there is an error") {
+TEST_CASE("child_process: a program that is not there is an error", "[kernel]") {
     const auto none = ChildProcess::start({"/nowhere/program"}, ChildProcess::Errors::inherited);
     REQUIRE_FALSE(none);
     CHECK_THAT(none.error().message(), Catch::Contains("/nowhere/program: cannot be started"));
