@@ -31,6 +31,7 @@ set(configuration_name versavis)
 set(state_directory versavis)
 foreach(pair
         versavisd.service.in:systemd/system/versavisd.service
+        versavis-lidar@.service.in:systemd/system/versavis-lidar@.service
         versavis-metrics.service.in:systemd/system/versavis-metrics.service
         versavis-verify.service.in:systemd/system/versavis-verify.service
         versavis-web.service.in:systemd/system/versavis-web.service

@@ -179,6 +179,10 @@ void Service::ask(const std::string& camera, CameraWish wish) {
 
 ChangeReport Service::changes(const std::string& camera) const { return cameras_->changes(camera); }
 
+bool Service::report_lidars(const std::vector<LidarReport>& reports) {
+    return lidars_.add(reports, host_now());
+}
+
 bool Service::stop() {
     const bool ended = cameras_->stop(host_now() + stop_patience);
     board_->stop();
@@ -369,6 +373,7 @@ Status Service::collect_status(HostTime now) {
     status.grid = alignment_.report(now);
     for (TimeOutputReport& report : time_announcer_.report(now))
         status.time_outputs.push_back({std::move(report)});
+    for (LidarReport& report : lidars_.report(now)) status.lidars.push_back({std::move(report)});
     status.cameras = cameras_->status();
     status.streams = cameras_->streams();
     status.ptp = cameras_->ptp();

@@ -50,6 +50,7 @@ class Service final : public Controlled, private BoardListener {
     void reconfigure(const Configuration& configuration) override;
     void ask(const std::string& camera, CameraWish wish) override;
     ChangeReport changes(const std::string& camera) const override;
+    bool report_lidars(const std::vector<LidarReport>& reports) override;
 
     const std::filesystem::path& directory() const { return directory_.path(); }
 
@@ -98,6 +99,7 @@ class Service final : public Controlled, private BoardListener {
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     TimeAnnouncer time_announcer_;
+    LidarReports lidars_;
     TickNumbers ticks_;  ///< of the link's thread
     TriggerGrid grid_;   ///< the same
     std::unique_ptr<EventJournal> events_;

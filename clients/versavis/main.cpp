@@ -247,7 +247,7 @@ int main(int argc, char** argv) {
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
     if (gnss.chosen()) return gnss.run();
-    if (lidar.chosen()) return lidar.run();
+    if (lidar.chosen()) return lidar.run(instance);
     if (control.chosen()) return control.run(instance);
     if (discover.chosen()) return discover.run(instance);
     if (recorder.chosen()) return recorder.run(instance);

@@ -36,6 +36,30 @@ std::optional<std::string> to_toml(const json& value) {
     return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+/// None: a member is missing, or of another kind.
+std::optional<LidarReport> lidar_of(const json& value) {
+    const auto text = [&](const char* name) -> std::optional<std::string> {
+        const auto found = value.find(name);
+        if (found == value.end() || !found->is_string()) return std::nullopt;
+        return found->get<std::string>();
+    };
+    const auto time = [&](const char* name) -> std::optional<Duration> {
+        const auto found = value.find(name);
+        if (found == value.end() || !found->is_number_integer()) return std::nullopt;
+        return Duration{found->get<std::int64_t>()};
+    };
+    if (!value.is_object()) return std::nullopt;
+    const auto source = text("source");
+    const auto maker = text("maker");
+    const auto verdict = text("verdict");
+    const auto hint = text("hint");
+    if (!source || source->empty() || !maker || !verdict || !hint ||
+        std::find(std::begin(lidar_verdicts), std::end(lidar_verdicts), *verdict) ==
+            std::end(lidar_verdicts))
+        return std::nullopt;
+    return LidarReport{*source, *maker, *verdict, *hint, time("behind_ns"), time("ahead_ns")};
+}
+
 json state_of(const Summary& health) {
     json cameras = json::array();
     for (const DeviceSummary& camera : health.cameras)
@@ -61,7 +85,8 @@ const Control::Method Control::methods[] = {
     {"org.versavis.service.StopCamera", &Control::stop_camera},
     {"org.versavis.service.RestartCamera", &Control::restart_camera},
     {"org.versavis.service.SetCamera", &Control::set_camera},
-    {"org.versavis.service.Reload", &Control::reload}};
+    {"org.versavis.service.Reload", &Control::reload},
+    {"org.versavis.service.ReportLidars", &Control::report_lidars}};
 
 void Control::tick(const Summary& health, HostTime now) {
     now_ = now;
@@ -236,6 +261,21 @@ void Control::reload(Client client, const VarlinkCall& /*call*/) {
     if (!done)
         return fail(client, "org.versavis.service.Refused", {{"problems", texts(done.error())}});
     reply(client, {{"changed", done->changed}, {"need_restart", done->need_restart}});
+}
+
+void Control::report_lidars(Client client, const VarlinkCall& call) {
+    std::vector<LidarReport> reports;
+    const auto given = call.parameters.find("lidars");
+    bool understood = given != call.parameters.end() && given->is_array();
+    if (understood)
+        for (const json& value : *given) {
+            auto report = lidar_of(value);
+            understood = understood && report;
+            if (report) reports.push_back(std::move(*report));
+        }
+    if (!understood || !service_.report_lidars(reports))
+        return fail(client, "org.varlink.service.InvalidParameter", {{"parameter", "lidars"}});
+    reply(client, json::object());
 }
 
 }  // namespace versavis::daemon

@@ -28,6 +28,8 @@ class Controlled {
     virtual void reconfigure(const Configuration& configuration) = 0;
     virtual void ask(const std::string& camera, CameraWish wish) = 0;
     virtual ChangeReport changes(const std::string& camera) const = 0;
+    /// False: these are too many LiDARs.
+    virtual bool report_lidars(const std::vector<LidarReport>& reports) = 0;
 };
 
 /// Values that were changed, and those that the next start of the service will change.
@@ -75,6 +77,7 @@ class Control {
     void restart_camera(Client client, const VarlinkCall& call);
     void set_camera(Client client, const VarlinkCall& call);
     void reload(Client client, const VarlinkCall& call);
+    void report_lidars(Client client, const VarlinkCall& call);
     void ask(Client client, const VarlinkCall& call, CameraWish wish);
     bool known_camera(Client client, const std::string& name);
     void adopt(ConfigurationDocument document);

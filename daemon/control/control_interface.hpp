@@ -27,6 +27,15 @@ method SetCamera(camera: string, values: object) -> (changed: []string)
 # service is restarted
 method Reload() -> (changed: []string, need_restart: []string)
 
+# From whoever watches the packets of LiDARs, as 'versavis lidar watch'; it holds for 30 s. source:
+# address. verdict: follows, unlocked, unset, off, drifts or unproved. hint: why, and what to do.
+# Its clock is behind the host's by behind_ns at most, or ahead of it by ahead_ns
+type Lidar (source: string, maker: string, verdict: string, hint: string, behind_ns: ?int,
+  ahead_ns: ?int)
+
+# 32 LiDARs at most
+method ReportLidars(lidars: []Lidar) -> ()
+
 error UnknownCamera (camera: string, cameras: []string)
 # Nothing was changed
 error Refused (problems: []string)

@@ -762,6 +762,8 @@ const char* to_string(Fault fault) {
         case Fault::time_unknown: return "time_unknown";
         case Fault::time_silent: return "time_silent";
         case Fault::time_wrong: return "time_wrong";
+        case Fault::lidar_not_following: return "lidar_not_following";
+        case Fault::lidar_unproved: return "lidar_unproved";
     }
     return "";
 }
@@ -946,6 +948,19 @@ Diagnosis diagnose(const TimeOutputStatus& output, const Status& all) {
         case TimeOutputState::sending: break;
     }
     return {};
+}
+
+Diagnosis diagnose(const LidarStatus& lidar, const Status& all) {
+    const LidarReport& report = lidar.report;
+    if (report.verdict == lidar_follows) return {};
+    std::string hint = report.hint;
+    for (const TimeOutputStatus& output : all.time_outputs)
+        if (output.diagnosis.fault != Fault::none)
+            hint += fmt::format("; the time output '{}' is {}: see its hint first",
+                                output.report.name, to_string(output.report.state));
+    const Fault fault =
+        report.verdict == lidar_unproved ? Fault::lidar_unproved : Fault::lidar_not_following;
+    return conclude(fault, std::move(hint), false, young(all.started, all.now));
 }
 
 }  // namespace versavis::daemon

@@ -13,6 +13,7 @@ namespace versavis::daemon {
 struct Status;
 struct CameraStatus;
 struct ImuStatus;
+struct LidarStatus;
 struct TimeOutputStatus;
 
 enum class Health {
@@ -85,8 +86,11 @@ enum class Fault {
     time_unknown,
     time_silent,
     time_wrong,
+    // Of a LiDAR.
+    lidar_not_following,
+    lidar_unproved,
 };
-constexpr Fault last_fault = Fault::time_wrong;
+constexpr Fault last_fault = Fault::lidar_unproved;
 const char* to_string(Fault fault);  ///< its word in the status; empty: none
 
 struct Diagnosis {
@@ -102,6 +106,7 @@ Diagnosis diagnose_clock(const Status& status);
 Diagnosis diagnose(const CameraStatus& camera, const Status& status);
 Diagnosis diagnose(const ImuStatus& imu, const Status& status);
 Diagnosis diagnose(const TimeOutputStatus& output, const Status& status);
+Diagnosis diagnose(const LidarStatus& lidar, const Status& status);
 
 /// Of a part that failed, one sentence.
 std::string describe_failure(const ImuReport& imu);

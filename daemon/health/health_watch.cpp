@@ -109,6 +109,10 @@ void HealthWatch::examine(Status& status) {
         date("time " + output.report.name, to_string(output.report.state), output.diagnosis,
              status.now);
     }
+    for (LidarStatus& lidar : status.lidars) {
+        lidar.diagnosis = diagnose(lidar, status);
+        date("lidar " + lidar.report.source, lidar.report.verdict, lidar.diagnosis, status.now);
+    }
 }
 
 void HealthWatch::measure(CameraStatus& camera, const Status& status) {

@@ -28,6 +28,8 @@ std::vector<std::pair<std::string, const Diagnosis*>> diagnoses(const Status& st
     for (const ImuStatus& imu : status.imus) all.emplace_back(imu.report.name, &imu.diagnosis);
     for (const TimeOutputStatus& output : status.time_outputs)
         all.emplace_back(output.report.name, &output.diagnosis);
+    for (const LidarStatus& lidar : status.lidars)
+        all.emplace_back(lidar.report.source, &lidar.diagnosis);
     return all;
 }
 
@@ -336,6 +338,17 @@ std::string to_json(const Status& status) {
                             {"error_ns", report.error ? json(report.error->ns) : json(nullptr)}},
                            output.diagnosis));
     }
+    json lidars = json::array();
+    for (const LidarStatus& lidar : status.lidars) {
+        const LidarReport& report = lidar.report;
+        lidars.push_back(
+            with_diagnosis({{"name", report.source},
+                            {"maker", report.maker},
+                            {"state", report.verdict},
+                            {"behind_ns", report.behind ? json(report.behind->ns) : json()},
+                            {"ahead_ns", report.ahead ? json(report.ahead->ns) : json()}},
+                           lidar.diagnosis));
+    }
     json nmea;
     if (status.nmea)
         nmea = {{"stream", nmea_stream},
@@ -366,6 +379,7 @@ std::string to_json(const Status& status) {
         {"imus", imus},
         {"ptp", ptp_json(status.ptp)},
         {"time_outputs", time_outputs},
+        {"lidars", lidars},
         {"nmea", nmea},
         {"streams", streams}};
     // Names from devices may hold anything; what is no UTF-8 is replaced.

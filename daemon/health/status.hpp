@@ -12,6 +12,7 @@
 #include "delivery.hpp"
 #include "diagnosis.hpp"
 #include "engine/clock/translator.hpp"
+#include "lidar_reports.hpp"
 #include "pipeline/camera_pipeline.hpp"
 #include "pipeline/imu_pipeline.hpp"
 #include "pipeline/nmea_pipeline.hpp"
@@ -42,6 +43,11 @@ struct TimeOutputStatus {
     Diagnosis diagnosis{};
 };
 
+struct LidarStatus {
+    LidarReport report;
+    Diagnosis diagnosis{};
+};
+
 struct StreamStatus {
     std::string name;
     std::string kind;
@@ -66,6 +72,7 @@ struct Status {
     std::vector<CameraStatus> cameras;
     std::vector<ImuStatus> imus;
     std::vector<TimeOutputStatus> time_outputs;
+    std::vector<LidarStatus> lidars;
     std::optional<NmeaReport> nmea;
     std::optional<PtpReport> ptp;
     std::vector<StreamStatus> streams;

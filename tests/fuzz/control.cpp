@@ -25,8 +25,12 @@ struct Service final : Controlled {
         ++report.asked, ++report.done;
     }
     ChangeReport changes(const std::string& /*camera*/) const override { return report; }
+    bool report_lidars(const std::vector<LidarReport>& reports) override {
+        return lidars.add(reports, {});
+    }
 
     ChangeReport report;
+    LidarReports lidars;
 };
 
 FileDescriptor connect(const std::string& path) {

@@ -249,7 +249,8 @@ TEST_CASE("faults: the manual has those of this table, and of those without a ri
         "camera_clock",       "double_frames",    "board_stamps",   "seconds_differ",
         "host_undisciplined", "time_unknown",     "time_silent",    "time_wrong",
         "ptp_master",         "ptp_lost",         "ptp_other_time", "ptp_refused",
-        "ptp_stamps",         "ptp_contradicted", "ptp_unread"};
+        "ptp_stamps",         "ptp_contradicted", "ptp_unread",     "lidar_not_following",
+        "lidar_unproved"};
     for (const Case& c : cases) words.insert(c.fault);
     std::set<std::string> rows;
     std::ifstream manual(VERSAVIS_SOURCE_DIR "/docs/user/troubleshooting.md");

@@ -33,10 +33,14 @@ struct SlowService final : Controlled {
         ++progress.asked;
     }
     ChangeReport changes(const std::string& /*camera*/) const override { return progress; }
+    bool report_lidars(const std::vector<LidarReport>& reports) override {
+        return lidars.add(reports, {});
+    }
 
     Configuration configuration;
     std::optional<CameraWish> wish;
     ChangeReport progress;
+    LidarReports lidars;
 };
 
 class ControlClientEnd {
@@ -206,6 +210,54 @@ TEST_CASE("control: a bad request changes nothing, and says why") {
         CHECK(bench.answer(client)["error"] == "org.varlink.service.InvalidParameter");
     }
     CHECK(bench.service.progress.asked == 0);
+}
+
+TEST_CASE("control: what LiDARs do is reported whole, or not at all") {
+    ControlBench bench;
+    ControlClientEnd client(bench.path);
+    const json good{{"source", "10.0.0.3"}, {"maker", "Livox"},    {"verdict", "off"},
+                    {"hint", "37 s ahead"}, {"behind_ns", 301000}, {"ahead_ns", nullptr}};
+    const auto reported = [&](const std::vector<json>& lidars) {
+        client.call(own + "ReportLidars", {{"lidars", lidars}});
+        return bench.answer(client).value("error", "");
+    };
+    CHECK(reported({good}).empty());
+    const auto known = bench.service.lidars.report({});
+    REQUIRE(known.size() == 1);
+    CHECK(known[0].source == "10.0.0.3");
+    CHECK(known[0].verdict == "off");
+    CHECK(known[0].hint == "37 s ahead");
+    CHECK(known[0].behind == microseconds(301));
+    CHECK_FALSE(known[0].ahead);
+    const std::string invalid = "org.varlink.service.InvalidParameter";
+    for (const char* key : {"source", "maker", "verdict", "hint"}) {
+        json other = good;
+        other["source"] = "10.0.0.4";
+        json bad = other;
+        bad.erase(key);
+        CHECK(reported({other, bad}) == invalid);
+        bad[key] = 3;
+        CHECK(reported({other, bad}) == invalid);
+    }
+    json bad = good;
+    bad["verdict"] = "perhaps";
+    CHECK(reported({bad}) == invalid);
+    bad = good;
+    bad["source"] = "";
+    CHECK(reported({bad}) == invalid);
+    CHECK(reported({"all"}) == invalid);
+    client.call(own + "ReportLidars", {{"lidars", "all"}});
+    CHECK(bench.answer(client)["error"] == invalid);
+    std::vector<json> many;
+    for (int i = 0; i < 32; ++i) {
+        many.push_back(good);
+        many.back()["source"] = std::to_string(i);
+    }
+    CHECK(reported(many) == invalid);  // with the first one, 33
+    CHECK(bench.service.lidars.report({}).size() == 1);
+    many.pop_back();
+    CHECK(reported(many).empty());
+    CHECK(reported({good}).empty());
 }
 
 TEST_CASE("control: the file is read again, whole or not at all") {

@@ -630,6 +630,31 @@ TEST_CASE("diagnosis: of a time output: the time is not known, or pulses are mis
     check_fault(diagnosed(TimeOutputState::waiting), Fault::board_gone, "after 'holdover_s'");
 }
 
+TEST_CASE("diagnosis: of a LiDAR: it follows, does not, or nobody knows") {
+    DiagnosisBench bench;
+    bench.board();
+    LidarReports reports;
+    const HostTime reported{seconds(100).ns};
+    const auto diagnosed = [&](const char* verdict, HostTime now) {
+        REQUIRE(reports.add({{"10.0.0.3", "Livox", verdict, "why", {}, {}}}, reported));
+        return diagnose(LidarStatus{reports.report(now).at(0), {}}, bench.status);
+    };
+    CHECK(diagnosed("follows", reported).health == Health::ok);
+    for (const char* verdict : {"unlocked", "unset", "off", "drifts"})
+        check_fault(diagnosed(verdict, reported), Fault::lidar_not_following, "why");
+    check_fault(diagnosed("unproved", reported), Fault::lidar_unproved, "why");
+    CHECK(diagnosed("follows", reported + seconds(30)).fault == Fault::none);
+    check_fault(diagnosed("follows", reported + seconds(31)), Fault::lidar_unproved,
+                "'versavis lidar watch' runs");
+    // The cause may be what the board sends.
+    bench.status.time_outputs.push_back({});
+    bench.status.time_outputs[0].report.name = "roof";
+    CHECK(diagnosed("off", reported).hint == "why");
+    bench.status.time_outputs[0].diagnosis.fault = Fault::time_unknown;
+    check_fault(diagnosed("off", reported), Fault::lidar_not_following,
+                "why; the time output 'roof' is waiting");
+}
+
 namespace {
 
 std::string text_of(const char* name) {

@@ -119,6 +119,21 @@ TEST_CASE("status: what a time output sent last, if anything") {
     CHECK(health(status) == Health::degraded);
 }
 
+TEST_CASE("status: LiDARs as they were reported, and the worst of them counts") {
+    Status status = healthy();
+    CHECK(nlohmann::json::parse(to_json(status))["lidars"].empty());
+    status.lidars.push_back({{"10.0.0.3", "Livox", "follows", "", microseconds(301), {}}});
+    const auto lidar = nlohmann::json::parse(to_json(status))["lidars"][0];
+    CHECK(lidar["name"] == "10.0.0.3");
+    CHECK(lidar["maker"] == "Livox");
+    CHECK(lidar["state"] == "follows");
+    CHECK(lidar["behind_ns"] == 301'000);
+    CHECK(lidar["ahead_ns"].is_null());
+    CHECK(health(status) == Health::ok);
+    status.lidars[0].diagnosis = {Health::degraded, Fault::lidar_not_following, "", {}};
+    CHECK(health(status) == Health::degraded);
+}
+
 TEST_CASE("status: how packets are received, once that is decided") {
     Status status = healthy();
     const auto receive = [&] {

@@ -9,15 +9,29 @@
 #include <chrono>
 
 #include "base/fail.hpp"
-#include "lidar/lidar_check.hpp"
+#include "control/control_client.hpp"
 
 namespace versavis::client {
+
+namespace {
+
+/// Empty, or why the service does not know them.
+std::string reported(const std::vector<LidarReport>& reports, const std::string& instance) {
+    if (reports.empty()) return "";
+    auto service = ControlClient::connect(instance);
+    if (!service) return service.error().message();
+    const auto done = service->call("ReportLidars", {{"lidars", lidar_json(reports)}});
+    return done ? "" : done.error().message();
+}
+
+}  // namespace
 
 LidarCommand::LidarCommand(CLI::App& app, std::function<bool()> stop)
     : command_(app.add_subcommand("lidar", "LiDARs that take their time from the board")),
       stop_(std::move(stop)) {
     command_->require_subcommand(1);
     add_check();
+    add_watch();
     add_phase();
 }
 
@@ -35,6 +49,19 @@ void LidarCommand::add_check() {
         ->capture_default_str()
         ->excludes(file);
     check->add_flag("--json", json_, "Print a JSON array");
+}
+
+void LidarCommand::add_watch() {
+    watch_ = command_->add_subcommand(
+        "watch",
+        "Watch the packets of LiDARs at a network interface, and report to the service whether "
+        "they follow: 'versavis status' shows it. Prints what changes (docs/user/lidar.md)");
+    watch_->add_option("-i,--interface", interface_, "The network interface")->required();
+    constexpr int longest_window_s = 20;  // the service keeps a report for 30 s
+    watch_->add_option("--seconds", seconds_, "From one report to the next")
+        ->check(CLI::Range(2, longest_window_s))
+        ->capture_default_str();
+    watch_->add_flag("--json", json_, "Print one JSON array per report");
 }
 
 void LidarCommand::add_phase() {
@@ -57,7 +84,10 @@ void LidarCommand::add_phase() {
     phase_->add_flag("--json", json_, "Print one JSON object");
 }
 
-int LidarCommand::run() const { return phase_->parsed() ? run_phase() : run_check(); }
+int LidarCommand::run(const std::string& instance) const {
+    if (phase_->parsed()) return run_phase();
+    return watch_->parsed() ? run_watch(instance) : run_check();
+}
 
 int LidarCommand::run_phase() const {
     const auto phase = lidar_phase(rotation_, azimuth_, rate_hz_);
@@ -73,6 +103,47 @@ int LidarCommand::run_phase() const {
     return EX_OK;
 }
 
+/// All that comes, or for as long as is asked for. None: nothing more can be read.
+std::optional<LidarCheck> LidarCommand::look(Capture& capture, bool live) const {
+    LidarCheck check;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds_);
+    while (!stop_() && !(live && std::chrono::steady_clock::now() >= end)) {
+        const auto datagram = capture.next();
+        if (!datagram) {
+            fail(datagram.error());
+            if (live) return std::nullopt;
+        }
+        // What came before a damaged place of a file counts.
+        if (!datagram || capture.ended()) break;
+        if (*datagram) check.add(**datagram);
+    }
+    return check;
+}
+
+int LidarCommand::run_watch(const std::string& instance) const {
+    auto capture = Capture::open_interface(interface_);
+    if (!capture) return fail(capture.error(), EX_UNAVAILABLE);
+    std::map<std::string, LidarVerdict> known;
+    std::string unheard;  // why the service did not hear the last report
+    for (;;) {
+        const auto check = look(*capture, true);
+        if (!check) return EX_IOERR;
+        if (stop_()) return EX_OK;
+        const auto reports = check->reports();
+        std::vector<LidarReport> changed;
+        for (const LidarReport& report : reports) {
+            const auto [before, is_new] = known.try_emplace(report.source, report.verdict);
+            if (is_new || before->second != report.verdict) changed.push_back(report);
+            before->second = report.verdict;
+        }
+        fmt::print("{}", json_ ? lidar_json(reports).dump() + "\n" : lidar_text(changed));
+        std::fflush(stdout);
+        const std::string problem = reported(reports, instance);
+        if (!problem.empty() && problem != unheard) fmt::print(stderr, "versavis: {}\n", problem);
+        unheard = problem;
+    }
+}
+
 int LidarCommand::run_check() const {
     if (file_.empty() && interface_.empty())
         return fail(Error{"lidar check", "there is nothing to check",
@@ -82,18 +153,11 @@ int LidarCommand::run_check() const {
     auto capture = live ? Capture::open_interface(interface_) : Capture::open_file(file_);
     if (!capture) return fail(capture.error(), live ? EX_UNAVAILABLE : EX_NOINPUT);
     if (live) fmt::print(stderr, "Capturing for {:g} s ...\n", seconds_);
-    LidarCheck check;
-    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds_);
-    while (!stop_() && !(live && std::chrono::steady_clock::now() >= end)) {
-        const auto datagram = capture->next();
-        // What came before a damaged place counts.
-        if (!datagram) fail(datagram.error());
-        if (!datagram || capture->ended()) break;
-        if (*datagram) check.add(**datagram);
-    }
+    const auto check = look(*capture, live);
+    if (!check) return EX_IOERR;
     if (const auto dropped = capture->dropped(); dropped > 0)
         fmt::print(stderr, "versavis: {} frames were not read in time\n", dropped);
-    const auto reports = check.reports();
+    const auto reports = check->reports();
     if (json_)
         fmt::print("{}\n", lidar_json(reports).dump());
     else

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The commands `versavis lidar check` and `phase`.
+// The commands `versavis lidar check`, `watch` and `phase`.
 #pragma once
 
 #include <CLI/App.hpp>
 #include <functional>
+#include <optional>
 #include <string>
 
+#include "lidar/lidar_check.hpp"
 #include "lidar/lidar_phase.hpp"
 
 namespace versavis::client {
@@ -20,15 +22,19 @@ class LidarCommand {
     bool chosen() const { return command_->parsed(); }
 
     /// Returns the program's exit code.
-    int run() const;
+    int run(const std::string& instance) const;
 
  private:
     void add_check();
+    void add_watch();
     void add_phase();
+    std::optional<LidarCheck> look(Capture& capture, bool live) const;
     int run_check() const;
+    int run_watch(const std::string& instance) const;
     int run_phase() const;
 
     CLI::App* command_;
+    CLI::App* watch_ = nullptr;
     CLI::App* phase_ = nullptr;
     std::function<bool()> stop_;
     std::string file_;

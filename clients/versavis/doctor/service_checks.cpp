@@ -111,7 +111,7 @@ Findings check_devices(const Subject& subject) {
     for (const char* part : {"board", "clock"})
         if (status.contains(part))
             add_device(findings, status[part], part, status[part].value("state", ""));
-    for (const char* kind : {"cameras", "imus", "time_outputs"})
+    for (const char* kind : device_arrays)
         for (const json& device : status.value(kind, json::array()))
             add_device(findings, device, device.value("name", ""), state_and_rate(device));
     return findings;
@@ -256,7 +256,7 @@ std::string first_cause(const json& status, const std::string& health) {
     for (const char* part : {"board", "clock"})
         if (status.contains(part) && status[part].value("health", "") == health)
             return text(status[part], part);
-    for (const char* kind : {"cameras", "imus", "time_outputs"})
+    for (const char* kind : device_arrays)
         for (const json& device : status.value(kind, json::array()))
             if (device.value("health", "") == health) return text(device, device.value("name", ""));
     return "";

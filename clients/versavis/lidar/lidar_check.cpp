@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace versavis::client {
 
@@ -96,8 +97,8 @@ Slope slope_of(const std::map<std::int64_t, Duration>& smallest) {
     return {-slope, std::sqrt(std::max(0.0, dd - slope * td) / (count - 2) / tt)};
 }
 
-nlohmann::json known(bool is_known, double value) {
-    return is_known ? nlohmann::json(value) : nlohmann::json(nullptr);
+nlohmann::json known(bool is_known, nlohmann::json value) {
+    return is_known ? std::move(value) : nlohmann::json(nullptr);
 }
 
 }  // namespace
@@ -221,7 +222,6 @@ nlohmann::json lidar_json(const std::vector<LidarReport>& reports) {
     nlohmann::json all = nlohmann::json::array();
     for (const LidarReport& report : reports) {
         const bool paced = report.delay && report.duration >= shortest_drift;
-        const auto ns = [](Duration duration) { return static_cast<double>(duration.ns); };
         all.push_back(
             {{"source", report.source},
              {"maker", report.maker},
@@ -229,10 +229,10 @@ nlohmann::json lidar_json(const std::vector<LidarReport>& reports) {
              {"hint", report.hint},
              {"remark", report.remark},
              {"packets", report.packets},
-             {"duration_s", ns(report.duration) * 1e-9},
-             {"delay_ns", known(report.delay.has_value(), report.delay ? ns(*report.delay) : 0)},
-             {"behind_ns", known(report.delay.has_value(), ns(report.behind))},
-             {"ahead_ns", known(report.delay.has_value(), ns(report.ahead))},
+             {"duration_s", static_cast<double>(report.duration.ns) * 1e-9},
+             {"delay_ns", known(report.delay.has_value(), report.delay.value_or(Duration{}).ns)},
+             {"behind_ns", known(report.delay.has_value(), report.behind.ns)},
+             {"ahead_ns", known(report.delay.has_value(), report.ahead.ns)},
              {"drift_ppm", known(paced, report.drift_ppm)},
              {"drift_sigma_ppm", known(paced, report.drift_sigma_ppm)}});
     }

@@ -84,6 +84,13 @@ class Instance {
             node.offset_ns = number(output, "error_ns");
             clocks_.push_back(std::move(node));
         }
+        for (const json& lidar : parts(status_, "lidars")) {
+            ClockNode node = device(lidar, path_of(text(lidar, "name")), "lidar", host_name);
+            node.path = "packets of the LiDAR";
+            if (const auto behind = number(lidar, "behind_ns"))
+                node.bound_ns = std::max(*behind, number(lidar, "ahead_ns").value_or(0));
+            clocks_.push_back(std::move(node));
+        }
     }
 
  private:

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "status/status_document.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -45,7 +47,7 @@ std::vector<Device> devices(const json& status) {
     std::vector<Device> all;
     for (const char* part : {"board", "clock"})
         if (status.contains(part)) all.push_back({part, &status[part]});
-    for (const char* kind : {"cameras", "imus", "time_outputs"})
+    for (const char* kind : device_arrays)
         if (status.contains(kind))
             for (const json& device : status[kind])
                 all.push_back({device.value("name", ""), &device});

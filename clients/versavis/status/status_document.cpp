@@ -85,7 +85,7 @@ std::string preset_of(const nlohmann::json& status, const std::string& name) {
 Error explain(const Error& error, const std::string& instance, const std::string& stream) {
     const auto status = read_status(instance);
     if (!status) return error;
-    for (const char* kind : {"cameras", "imus", "time_outputs"})
+    for (const char* kind : device_arrays)
         for (const auto& device : status->value(kind, nlohmann::json::array()))
             if (device.value("name", "") == stream && !device.value("fault", std::string()).empty())
                 return {stream,

@@ -10,6 +10,9 @@
 
 namespace versavis::client {
 
+/// Arrays of the document whose objects are devices, with a name and a health.
+inline constexpr const char* device_arrays[] = {"cameras", "imus", "time_outputs", "lidars"};
+
 /// The newest document of `instance`. Errors: the service is not running, its process has ended, or
 /// its heart has not beaten for three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);

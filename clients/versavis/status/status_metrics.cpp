@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "status/status_document.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -262,7 +264,7 @@ template <class Use>
 void for_each_device(const json& status, Use use) {
     for (const char* name : {"board", "clock"})
         if (status.contains(name)) use(status[name], std::string(name));
-    for (const char* kind : {"cameras", "imus", "time_outputs"})
+    for (const char* kind : device_arrays)
         for (const json& device : status.value(kind, json::array()))
             use(device, device.value("name", ""));
 }

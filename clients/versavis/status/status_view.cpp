@@ -155,6 +155,15 @@ std::string time_output_lines(const json& output, Hints& hints) {
     return wrapped_part(line) + hints.of(output, text(output, "name"));
 }
 
+std::string lidar_lines(const json& lidar, Hints& hints) {
+    std::string line = fmt::format("{:<8} {:<10} {}", text(lidar, "maker"), text(lidar, "state"),
+                                   text(lidar, "name"));
+    if (lidar.value("behind_ns", json()).is_number())
+        line += fmt::format(", {} us behind at most, or {} ahead", in_us(lidar, "behind_ns"),
+                            in_us(lidar, "ahead_ns"));
+    return wrapped_part(line) + hints.of(lidar, text(lidar, "name"));
+}
+
 /// What is taken off the middle of its exposures, before it is known: nothing.
 std::string delay_line(const json& camera) {
     if (text(camera, "line").empty()) return "";
@@ -328,6 +337,8 @@ std::string status_text(const json& status, Detail detail, Colour colour) {
         add(imu, imu_lines(imu, detail, hints));
     for (const json& output : status.value("time_outputs", json::array()))
         add(output, time_output_lines(output, hints));
+    for (const json& lidar : status.value("lidars", json::array()))
+        add(lidar, lidar_lines(lidar, hints));
     if (detail == Detail::summary) return out;
     for (const json& stream : status.value("streams", json::array()))
         out +=

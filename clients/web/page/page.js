@@ -216,6 +216,9 @@ function device_rows(status) {
     for (const output of status.time_outputs ?? [])
         add(output.name, output, `${output.pulses} pulses` +
             (output.error_ns === null ? "" : `, ${length_of(output.error_ns)} off`));
+    for (const lidar of status.lidars ?? [])
+        add(lidar.name, lidar, lidar.behind_ns === null ? lidar.maker
+            : `${lidar.maker}, ${length_of(lidar.behind_ns)} behind at most`);
     return rows;
 }
 
