@@ -14,8 +14,8 @@ namespace {
 constexpr std::int64_t second_ns = 1'000'000'000;
 constexpr std::int64_t bucket_ns = second_ns / 10;
 
-/// Before, no clock of a LiDAR that was set can be.
-constexpr Duration year_2000 = seconds(946'684'800);
+/// Before, no clock of a LiDAR that was set can be; some begin at 1970, others at 2000.
+constexpr Duration year_2020 = seconds(1'577'836'800);
 
 /// A way takes no longer, even where packets wait; more is another time. If lower, busy hosts seem
 /// to have a LiDAR that is off; if higher, small offsets are not seen.
@@ -130,7 +130,7 @@ void LidarCheck::add(const Datagram& datagram) {
     if (!packet->time) return;
     ++lidar.timed;
     lidar.covers = packet->covers;
-    if (packet->span.ns == 0 && *packet->time < year_2000) {
+    if (packet->span.ns == 0 && *packet->time < year_2020) {
         lidar.since_start = true;
         return;
     }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 
 namespace versavis::client {
@@ -79,6 +80,84 @@ std::optional<LidarPacket> hesai_gps(const Datagram& datagram) {
     return packet;
 }
 
+std::optional<Duration> since_1970(int year, unsigned month, unsigned day, unsigned hours,
+                                   unsigned minutes, unsigned secs) {
+    const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month),
+                                           std::chrono::day(day)};
+    if (!date.ok() || hours > 23 || minutes > 59 || secs > 60) return std::nullopt;
+    const std::int64_t days = std::chrono::sys_days(date).time_since_epoch().count();
+    return seconds(days * 86'400 + hours * 3600 + minutes * 60 + secs);
+}
+
+/// Hesai user manuals, "Point Cloud Data Packet", tail: whole seconds as a date, and us; some count
+/// years since 1900, others since 2000.
+std::optional<LidarPacket> hesai_points(const Datagram& datagram) {
+    struct Layout {
+        std::size_t size;
+        std::uint8_t first;
+        std::uint8_t second;
+        std::size_t date_at;
+        std::size_t us_at;
+    };
+    constexpr std::size_t sequence = 4;  // ends some packets, as the LiDAR is set
+    constexpr Layout layouts[] = {{1262, 0xFF, 0xEE, 1256, 1250},             // Pandar40P
+                                  {1262 + sequence, 0xFF, 0xEE, 1256, 1250},  //
+                                  {1194, 0xEE, 0xFF, 1188, 1182},             // Pandar64
+                                  {1194 + sequence, 0xEE, 0xFF, 1188, 1182},  //
+                                  {1080, 0xEE, 0xFF, 1065, 1071},             // PandarXT-32
+                                  {1072, 0xEE, 0xFF, 1062, 1056},             // PandarQT
+                                  {861, 0xEE, 0xFF, 820, 826}};               // Pandar128, OT128
+    const auto& bytes = datagram.payload;
+    const auto* layout =
+        std::find_if(std::begin(layouts), std::end(layouts), [&](const Layout& known) {
+            return datagram.size == known.size && begins_with(bytes, known.first, known.second);
+        });
+    if (layout == std::end(layouts) || bytes.size() < datagram.size) return std::nullopt;
+    const auto date = bytes.subspan(layout->date_at, 6);
+    const auto us = read_at<std::uint32_t>(bytes, layout->us_at);
+    const int year = date[0] + (date[0] >= 100 ? 1900 : 2000);
+    LidarPacket packet{"Hesai"};
+    packet.time = since_1970(year, date[1], date[2], date[3], date[4], date[5]);
+    if (packet.time) packet.time = *packet.time + microseconds(us);
+    return packet;
+}
+
+/// RoboSense user guides, MSOP header, big-endian: of the RS-16, RS-32 and RS-Bpearl a date, of
+/// others seconds since 1970 and us. A date begins with its year since 2000, which is not 0.
+std::optional<LidarPacket> robosense(const Datagram& datagram) {
+    struct Layout {
+        std::size_t size;
+        std::array<std::uint8_t, 4> id;
+        std::size_t time_at;
+    };
+    constexpr Layout layouts[] = {{1248, {0x55, 0xAA, 0x05, 0x0A}, 20},   // with Helios
+                                  {1248, {0x55, 0xAA, 0x05, 0x5A}, 10},   // RS-80, Ruby
+                                  {1210, {0x55, 0xAA, 0x5A, 0xA5}, 10}};  // M1
+    const auto& bytes = datagram.payload;
+    const auto* layout =
+        std::find_if(std::begin(layouts), std::end(layouts), [&](const Layout& known) {
+            return datagram.size == known.size && bytes.size() >= datagram.size &&
+                   std::equal(known.id.begin(), known.id.end(), bytes.begin());
+        });
+    if (layout == std::end(layouts)) return std::nullopt;
+    const auto field = bytes.subspan(layout->time_at, 10);
+    const auto number = [&](std::size_t at, std::size_t size) {
+        std::int64_t value = 0;
+        for (std::size_t i = at; i < at + size; ++i) value = value << 8U | field[i];
+        return value;
+    };
+    constexpr std::int64_t last_s = std::int64_t{1} << 33U;  // the year 2242
+    LidarPacket packet{"RoboSense"};
+    if (field[0] != 0) {
+        packet.time = since_1970(2000 + field[0], field[1], field[2], field[3], field[4], field[5]);
+        if (packet.time)
+            packet.time = *packet.time + milliseconds(number(6, 2)) + microseconds(number(8, 2));
+    } else if (number(0, 6) < last_s && number(6, 4) < 1'000'000) {
+        packet.time = seconds(number(0, 6)) + microseconds(number(6, 4));
+    }
+    return packet;
+}
+
 /// Livox LiDAR communication protocol of Mid-360 and HAP, point cloud and IMU data.
 std::optional<LidarPacket> livox(const Datagram& datagram) {
     constexpr std::uint16_t ports[] = {56300, 56400, 57000, 58000};
@@ -125,7 +204,8 @@ std::optional<LidarPacket> ouster(const Datagram& datagram) {
 }  // namespace
 
 std::optional<LidarPacket> lidar_packet_of(const Datagram& datagram) {
-    for (const auto parse : {velodyne_data, velodyne_position, hesai_gps, livox, ouster})
+    for (const auto parse :
+         {velodyne_data, velodyne_position, hesai_gps, hesai_points, robosense, livox, ouster})
         if (auto packet = parse(datagram)) return packet;
     return std::nullopt;
 }

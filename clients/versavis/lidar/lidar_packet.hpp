@@ -27,7 +27,7 @@ struct LidarPacket {
 };
 
 /// None: the datagram is not of a LiDAR that is known here. Velodyne (data and position packets),
-/// Ouster, Livox (of SDK 2), Hesai (GPS packets: the lock alone).
+/// Ouster, Livox (of SDK 2), Hesai (points; GPS packets: the lock alone), RoboSense.
 std::optional<LidarPacket> lidar_packet_of(const Datagram& datagram);
 
 }  // namespace versavis::client
