@@ -213,7 +213,7 @@ Expected<> BoardLink::converse() {
         if (auto sent = send(wire::Start{0, wire::start_on_sync, {}}); !sent) return sent;
     }
     while (!stop_) {
-        if (!connected_ && !awaits_sync_) {
+        if (!connected_ && !report_.awaits_sync) {
             connected_ = true;
             accept_starts();
             listener_.board_connected();
@@ -430,13 +430,13 @@ void BoardLink::take_answer(const wire::Packet& packet) {
     if (!possible(health)) return count_impossible();
     const std::lock_guard lock(report_mutex_);
     report_.health = counters_.since_start(health);
-    if (health.sync_state != wire::SyncState::none) report_.awaits_sync = awaits_sync_ = false;
+    if (health.sync_state != wire::SyncState::none) report_.awaits_sync = false;
 }
 
 /// Its grid is to begin with a pulse of the sync input, before any camera is started.
 void BoardLink::await_sync(bool awaited) {
     const std::lock_guard lock(report_mutex_);
-    report_.awaits_sync = awaits_sync_ = awaited;
+    report_.awaits_sync = awaited;
 }
 
 /// The answer to ours, or one that nobody asked for: then the board begins a new life.

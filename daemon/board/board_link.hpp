@@ -169,7 +169,6 @@ class BoardLink {
     BoardCounters counters_;
     bool greeted_ = false;
     bool connected_ = false;
-    bool awaits_sync_ = false;         ///< the grid is to begin with a sync pulse
     std::uint64_t dropped_bytes_ = 0;  ///< of this connection, reported so far
     bool anew_ = false;  ///< the board began a new life, or seems to: greet it at once
     device::Greeting greeting_;
