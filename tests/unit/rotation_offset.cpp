@@ -151,6 +151,40 @@ TEST_CASE("rotation_offset: turns about one axis show the offset, but not the ro
     CHECK(squares / run_count < 1.6);
 }
 
+TEST_CASE(
+    "rotation_offset: a wrong focal length is found, and misleads neither offset nor rotation",
+    "[statistics]") {
+    const double scale = GENERATE(0.75, 0.9, 0.98, 1.02, 1.1, 1.25);
+    const double about_z = GENERATE(0.3, 1.0, 2.0);
+    CAPTURE(scale, about_z);
+    double offset_nees = 0;
+    double rotation_nees = 0;
+    for (unsigned seed = 0; seed < run_count; ++seed) {
+        MovingWorld world;
+        world.axes = {1, 0.7, about_z};
+        Seen seen = OffsetSimulation(world, 3000 + seed).run();
+        for (FrameRotation& frame : seen.frames) frame.rotation.head<2>() *= scale;
+        const auto found = rotation_offset(seen.frames, seen.gyro);
+        REQUIRE(found);
+        CHECK(found->camera_scale == Approx(scale).epsilon(0.005));
+        offset_nees += std::pow((found->offset_s - world.offset_s) / found->offset_sigma_s, 2);
+        const Eigen::Vector3d off =
+            rotation_of(found->camera_from_imu * rotation_by(true_rotation).conjugate());
+        rotation_nees += off.cwiseQuotient(found->rotation_sigma).squaredNorm() / 3;
+    }
+    CHECK(offset_nees / run_count < 1.6);
+    CHECK(rotation_nees / run_count < 1.6);
+}
+
+TEST_CASE("rotation_offset: a focal length of another resolution is refused", "[rotation_offset]") {
+    const double scale = GENERATE(0.5, 2.0);
+    Seen seen = OffsetSimulation({}, 1).run();
+    for (FrameRotation& frame : seen.frames) frame.rotation.head<2>() *= scale;
+    const auto found = rotation_offset(seen.frames, seen.gyro);
+    REQUIRE_FALSE(found);
+    CHECK_THAT(found.error().message(), Contains("check the focal length"));
+}
+
 TEST_CASE("rotation_offset: periodic motion fits more than once", "[rotation_offset]") {
     Seen seen;
     const auto rate = [](double s) {

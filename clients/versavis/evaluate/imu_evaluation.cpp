@@ -114,6 +114,18 @@ void add_notes(const RecordedImu& imu, ImuEvaluation& evaluation) {
             evaluation.followed, evaluation.frames));
 }
 
+/// What the user may do about a lens that does not fit; smaller is what near scenes make.
+constexpr double noted_scale = 0.01;
+
+void add_scale_note(ImuEvaluation& evaluation) {
+    const double excess = evaluation.found.camera_scale - 1;
+    if (std::abs(excess) < noted_scale) return;
+    evaluation.notes.push_back(fmt::format(
+        "the pictures turn by {:.1f} % {} than the gyro: the focal length of the calibration is "
+        "too {}, or the scene is near; the results are without that",
+        std::abs(excess) * 100, excess > 0 ? "more" : "less", excess > 0 ? "short" : "long"));
+}
+
 json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 std::string rotation_text(const ImuEvaluation& evaluation) {
@@ -178,6 +190,7 @@ Expected<ImuEvaluation> evaluate_imu(const Recording& recording,
     auto found = rotation_offset(motion->rotations, motion->gyro, {settings.range});
     if (!found) return Unexpected(found.error());
     evaluation.found = std::move(*found);
+    add_scale_note(evaluation);
     return evaluation;
 }
 
@@ -194,6 +207,7 @@ json to_json(const ImuEvaluation& evaluation) {
              found.rotation_shown ? vector_json(found.rotation_sigma) : json(nullptr)},
             {"gyro_bias_rad_s", vector_json(found.gyro_bias)},
             {"gyro_bias_sigma_rad_s", vector_json(found.gyro_bias_sigma)},
+            {"camera_scale", found.camera_scale},
             {"residual_rad", found.residual},
             {"outlier_share", found.outlier_share},
             {"frames", evaluation.frames},

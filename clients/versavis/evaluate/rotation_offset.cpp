@@ -76,6 +76,16 @@ constexpr double longest_gap = 3;
 // if higher, a few lucky frames outweigh the others.
 constexpr double most_weight = 4;
 
+// A scale of the camera's turns counts when it differs from 1 by so many sigmas. If lower, noise is
+// taken for a lens; if higher, the rotation is off by more than its sigma.
+constexpr double clear_scale = 3;
+
+// From one scale to the next it changes by a tenth or less.
+constexpr int most_scales = 5;
+
+// A focal length that is off by more is a wrong calibration, as one of another resolution.
+constexpr double worst_scale = 0.3;
+
 double seconds_of(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
 double square(double x) { return x * x; }
 
@@ -127,6 +137,14 @@ class Problem {
         : turns_(std::move(turns)), gyro_(gyro) {}
 
     const std::vector<Turn>& turns() const { return turns_; }
+
+    /// The camera turned less about its x and y than it seems, by this factor.
+    void divide_by(double scale) {
+        for (Turn& turn : turns_) {
+            turn.rotation.head<2>() /= scale;
+            turn.back = rotation_by(-turn.rotation);
+        }
+    }
 
     Linearised at(const State& state) const {
         const GyroTrack track(gyro_, state.bias);
@@ -310,6 +328,32 @@ Matrix7 covariance(const Solution& solution) {
     return result;
 }
 
+struct LensScale {
+    double value = 1;
+    double sigma = HUGE_VAL;
+};
+
+/// A focal length that is too short by a factor makes turns about x and y too large by it, and
+/// leaves those about the optical axis; so does a near scene, where the camera moves as it turns.
+LensScale lens_scale(const Problem& problem, const Solution& solution) {
+    const GyroTrack track(problem.gyro(), solution.state.bias);
+    double products = 0;
+    double squares = 0;
+    for (std::size_t i = 0; i < problem.turns().size(); ++i) {
+        const Turn& turn = problem.turns()[i];
+        const Eigen::Quaterniond gyro =
+            track.orientation(turn.from + solution.state.offset).conjugate() *
+            track.orientation(turn.to + solution.state.offset);
+        const Eigen::Vector3d seen = solution.state.rotation * rotation_of(gyro);
+        const double weight = huber_weight(solution.at.residuals[i], solution.scale);
+        const Eigen::Vector2d weights = weight * turn.roots.head<2>().cwiseAbs2();
+        products += weights.dot(turn.rotation.head<2>().cwiseProduct(seen.head<2>()));
+        squares += weights.dot(seen.head<2>().cwiseAbs2());
+    }
+    if (squares <= 0) return {};
+    return {products / squares, solution.scale / std::sqrt(squares)};
+}
+
 std::vector<Turn> turns_within(const std::vector<FrameRotation>& frames,
                                const std::vector<GyroSample>& gyro, Duration range) {
     std::vector<std::int64_t> intervals;
@@ -410,6 +454,21 @@ bool shows_rotation(const Problem& problem, const Solution& best, const Matrix7&
     return axes.eigenvalues()[1] >= square(least_second_axis) * axes.eigenvalues()[2];
 }
 
+/// All solutions anew, without the scale of the lens, which is returned.
+double take_off_scale(Problem& problem, std::vector<Solution>& solutions, std::size_t best,
+                      double range) {
+    double scale = 1;
+    for (int i = 0; i < most_scales; ++i) {
+        const LensScale found = lens_scale(problem, solutions[best]);
+        if (!(std::abs(found.value - 1) > clear_scale * found.sigma) || found.value <= 0) break;
+        problem.divide_by(found.value);
+        scale *= found.value;
+        for (Solution& solution : solutions)
+            if (auto again = follow(problem, solution.state, range)) solution = std::move(*again);
+    }
+    return scale;
+}
+
 RotationOffset result_of(const Problem& problem, const Solution& best, const Matrix7& variances) {
     RotationOffset result;
     result.offset_s = best.state.offset;
@@ -437,7 +496,7 @@ Expected<RotationOffset> rotation_offset(const std::vector<FrameRotation>& frame
     if (gyro.size() < 2 || frames.empty())
         return failure("camera and IMU", "there are no frames or no samples to compare",
                        "record a camera and an IMU together");
-    const Problem problem(turns_within(frames, gyro, settings.range), gyro);
+    Problem problem(turns_within(frames, gyro, settings.range), gyro);
     if (problem.turns().size() < least_rotations)
         return failure("camera and IMU",
                        fmt::format("only {} rotations between frames lie within the IMU's samples",
@@ -455,10 +514,18 @@ Expected<RotationOffset> rotation_offset(const std::vector<FrameRotation>& frame
     std::size_t best = 0;
     for (std::size_t i = 1; i < solutions.size(); ++i)
         if (solutions[i].scale < solutions[best].scale) best = i;
+    const double scale = take_off_scale(problem, solutions, best, range);
     const Matrix7 variances = covariance(solutions[best]);
     if (const auto checked = check(problem, solutions[best], variances, solutions); !checked)
         return Unexpected(checked.error());
-    return result_of(problem, solutions[best], variances);
+    if (std::abs(scale - 1) > worst_scale)
+        return failure("camera and IMU",
+                       fmt::format("the pictures turn by {:.2f} times what the gyro says", scale),
+                       "check the focal length: is the calibration of this lens, and of this "
+                       "resolution?");
+    RotationOffset result = result_of(problem, solutions[best], variances);
+    result.camera_scale = scale;
+    return result;
 }
 
 }  // namespace versavis::client

@@ -30,7 +30,9 @@ struct RotationOffset {
     Eigen::Vector3d rotation_sigma;      ///< rad, about the camera's axes
     Eigen::Vector3d gyro_bias;           ///< rad/s, in the IMU's axes
     Eigen::Vector3d gyro_bias_sigma;
-    double residual = 0;       ///< rad, robust, of a usual component of a rotation between frames
+    double camera_scale =
+        1;                ///< by which the camera's turns about x and y are too large, taken off
+    double residual = 0;  ///< rad, robust, of a usual component of a rotation between frames
     double outlier_share = 0;  ///< of rotations that count for less than half
     std::size_t rotations = 0;
 };
