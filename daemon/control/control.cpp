@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/log.hpp"
@@ -36,28 +37,46 @@ std::optional<std::string> to_toml(const json& value) {
     return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+/// 31 years: a clock that is further off has no figure.
+constexpr std::int64_t furthest_lidar_ns = 1'000'000'000'000'000'000;
+
+/// One that every terminal and log shows as it is; none: it is missing, or another kind of value.
+std::optional<std::string> plain_text(const json& object, const char* name, std::size_t longest) {
+    const auto found = object.find(name);
+    if (found == object.end() || !found->is_string()) return std::nullopt;
+    const auto text = found->get<std::string>();
+    const auto is_plain = [](unsigned char c) { return c >= ' ' && c < 0x7F; };
+    if (text.size() > longest || !std::all_of(text.begin(), text.end(), is_plain))
+        return std::nullopt;
+    return text;
+}
+
 /// None: a member is missing, or of another kind.
 std::optional<LidarReport> lidar_of(const json& value) {
-    const auto text = [&](const char* name) -> std::optional<std::string> {
-        const auto found = value.find(name);
-        if (found == value.end() || !found->is_string()) return std::nullopt;
-        return found->get<std::string>();
-    };
-    const auto time = [&](const char* name) -> std::optional<Duration> {
-        const auto found = value.find(name);
-        if (found == value.end() || !found->is_number_integer()) return std::nullopt;
-        return Duration{found->get<std::int64_t>()};
-    };
     if (!value.is_object()) return std::nullopt;
-    const auto source = text("source");
-    const auto maker = text("maker");
-    const auto verdict = text("verdict");
-    const auto hint = text("hint");
-    if (!source || source->empty() || !maker || !verdict || !hint ||
+    constexpr std::size_t longest_name = 64;
+    constexpr std::size_t longest_hint = 512;
+    const auto source = plain_text(value, "source", longest_name);
+    const auto maker = plain_text(value, "maker", longest_name);
+    const auto verdict = plain_text(value, "verdict", longest_name);
+    const auto hint = plain_text(value, "hint", longest_hint);
+    if (!source || !maker || !verdict || !hint) return std::nullopt;
+    // An address, which no camera has as its name.
+    if (source->find_first_of(".:") == std::string::npos ||
         std::find(std::begin(lidar_verdicts), std::end(lidar_verdicts), *verdict) ==
             std::end(lidar_verdicts))
         return std::nullopt;
-    return LidarReport{*source, *maker, *verdict, *hint, time("behind_ns"), time("ahead_ns")};
+    LidarReport report{*source, *maker, *verdict, *hint, std::nullopt, std::nullopt};
+    for (const auto& [name, time] :
+         {std::pair("behind_ns", &report.behind), std::pair("ahead_ns", &report.ahead)}) {
+        const json figure = value.value(name, json());
+        if (figure.is_null()) continue;
+        if (!figure.is_number_integer()) return std::nullopt;
+        const double ns = figure.get<double>();
+        if (std::abs(ns) > static_cast<double>(furthest_lidar_ns)) return std::nullopt;
+        *time = Duration{figure.get<std::int64_t>()};
+    }
+    return report;
 }
 
 json state_of(const Summary& health) {
@@ -273,8 +292,11 @@ void Control::report_lidars(Client client, const VarlinkCall& call) {
             understood = understood && report;
             if (report) reports.push_back(std::move(*report));
         }
-    if (!understood || !service_.report_lidars(reports))
+    if (!understood)
         return fail(client, "org.varlink.service.InvalidParameter", {{"parameter", "lidars"}});
+    if (!service_.report_lidars(reports))
+        return fail(client, "org.versavis.service.Refused",
+                    {{"problems", {"these are more LiDARs than the service keeps: 32"}}});
     reply(client, json::object());
 }
 

@@ -28,12 +28,13 @@ method SetCamera(camera: string, values: object) -> (changed: []string)
 method Reload() -> (changed: []string, need_restart: []string)
 
 # From whoever watches the packets of LiDARs, as 'versavis lidar watch'; it holds for 30 s. source:
-# address. verdict: follows, unlocked, unset, off, drifts or unproved. hint: why, and what to do.
-# Its clock is behind the host's by behind_ns at most, or ahead of it by ahead_ns
+# address and interface, as 192.168.1.3%eth1. verdict: follows, unlocked, unset, off, drifts or
+# unproved. hint: why, and what to do. All in ASCII without control characters, 512 of the hint and
+# 64 of others. Its clock is behind the host's by behind_ns at most, or ahead of it by ahead_ns
 type Lidar (source: string, maker: string, verdict: string, hint: string, behind_ns: ?int,
   ahead_ns: ?int)
 
-# 32 LiDARs at most
+# 32 LiDARs at most; those that were not reported for 30 s make room
 method ReportLidars(lidars: []Lidar) -> ()
 
 error UnknownCamera (camera: string, cameras: []string)

@@ -953,14 +953,15 @@ Diagnosis diagnose(const TimeOutputStatus& output, const Status& all) {
 Diagnosis diagnose(const LidarStatus& lidar, const Status& all) {
     const LidarReport& report = lidar.report;
     if (report.verdict == lidar_follows) return {};
+    const bool in_time = young(all.started, all.now);
+    if (report.verdict == lidar_unproved)
+        return conclude(Fault::lidar_unproved, report.hint, false, in_time);
     std::string hint = report.hint;
     for (const TimeOutputStatus& output : all.time_outputs)
         if (output.diagnosis.fault != Fault::none)
-            hint += fmt::format("; the time output '{}' is {}: see its hint first",
+            hint += fmt::format("; if its time is that of '{}', see its hint first: it is {}",
                                 output.report.name, to_string(output.report.state));
-    const Fault fault =
-        report.verdict == lidar_unproved ? Fault::lidar_unproved : Fault::lidar_not_following;
-    return conclude(fault, std::move(hint), false, young(all.started, all.now));
+    return conclude(Fault::lidar_not_following, std::move(hint), false, in_time);
 }
 
 }  // namespace versavis::daemon

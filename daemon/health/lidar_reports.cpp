@@ -2,6 +2,7 @@
 #include "health/lidar_reports.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace versavis::daemon {
 
@@ -16,11 +17,17 @@ constexpr std::size_t most_lidars = 32;
 }  // namespace
 
 bool LidarReports::add(const std::vector<LidarReport>& reports, HostTime now) {
-    const auto added = std::count_if(
-        reports.begin(), reports.end(),
-        [&](const LidarReport& report) { return entries_.count(report.source) == 0; });
-    if (entries_.size() + static_cast<std::size_t>(added) > most_lidars) return false;
-    for (const LidarReport& report : reports) entries_[report.source] = {report, now};
+    std::map<std::string, Entry> entries = entries_;
+    for (const LidarReport& report : reports) entries[report.source] = {report, now};
+    // Those that nobody reports any more make room.
+    while (entries.size() > most_lidars) {
+        const auto oldest = std::min_element(
+            entries.begin(), entries.end(),
+            [](const auto& a, const auto& b) { return a.second.at < b.second.at; });
+        if (now - oldest->second.at <= validity) return false;
+        entries.erase(oldest);
+    }
+    entries_ = std::move(entries);
     return true;
 }
 

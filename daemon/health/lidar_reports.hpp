@@ -13,7 +13,7 @@ namespace versavis::daemon {
 
 /// What `versavis lidar watch` found; the words are its own.
 struct LidarReport {
-    std::string source;   ///< address, unique
+    std::string source;   ///< address and interface, as "192.168.1.3%eth1"
     std::string maker;    ///< as "Livox"
     std::string verdict;  ///< one of lidar_verdicts
     std::string hint;
@@ -29,7 +29,7 @@ inline constexpr const char* lidar_verdicts[] = {lidar_follows, "unlocked", "uns
 /// The newest report of each LiDAR. Not thread-safe.
 class LidarReports {
  public:
-    /// False: these would be more LiDARs than a vehicle has, and none is taken.
+    /// False: these are more LiDARs at once than a vehicle has, and none is taken.
     bool add(const std::vector<LidarReport>& reports, HostTime now);
 
     /// By address. One of which nobody reports any more is unproved.

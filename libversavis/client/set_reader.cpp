@@ -31,8 +31,8 @@ constexpr Duration retry_period = milliseconds(100);
 constexpr int most_losses = 16;
 
 // By how much frames of two instances may differ in host time to be of one grid point: boards that
-// share sync pulses, PPS or PTP place them within some microseconds. If higher, frames of cameras
-// that are as fast as 1 kHz meet those of the grid point before.
+// share sync pulses, PPS or PTP place them within some microseconds. If lower, the middles of
+// exposures that vary do not meet; if higher, frames of boards that share nothing meet by chance.
 constexpr Duration together = microseconds(500);
 
 /// Epoch and tick; where instances are several, 0 and host time, since ticks of two boards do not
@@ -52,12 +52,15 @@ struct Place {
 struct Instance {
     std::string name;
     std::optional<std::uint64_t> life;  ///< none: none of its cameras is there yet
+    std::optional<Key> finished;        ///< epoch and tick of its frames in the set before
 };
 
 struct Pending {
     std::vector<std::optional<Frame>> frames;
     HostTime give_up;
 };
+
+Key grid_point(const Frame& frame) { return {frame.data.epoch, frame.data.tick()}; }
 
 bool precedes(const EpochTime& a, const EpochTime& b) { return a.precedes(b); }
 
@@ -96,7 +99,10 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     Place place(const std::string& name);
     Key key_of(const Frame& frame) const;
     Key after(const Key& key) const;
-    Pending& set_of(const Key& key, std::size_t camera);
+    std::optional<Duration> distance(const Pending& set, const Frame& frame, std::size_t camera)
+        const;
+    Pending& set_of(const Frame& frame, std::size_t camera);
+    bool has_a_place(const Frame& frame, std::size_t camera) const;
     void begin(std::size_t instance, std::uint64_t life_now);
     StreamOptions options_of(const Place& place) const;
     Expected<> open(std::size_t camera);
@@ -108,7 +114,7 @@ struct [[gnu::visibility("hidden")]] SetReader::State {
     std::optional<NoItem> gone(const NoItem& why, std::size_t camera);
     bool any_ended() const;
     void add(std::size_t camera, Frame frame);
-    bool is_late(const Key& key, const EpochTime& time) const;
+    bool is_late(const Frame& frame, std::size_t camera) const;
     std::optional<EpochTime> end(const Key& key, const Pending& set);
     Duration spread(const Pending& set) const;
     bool decided(const Key& key, const Pending& set) const;
@@ -129,13 +135,13 @@ Place SetReader::State::place(const std::string& name) {
     const auto known = std::find_if(instances.begin(), instances.end(),
                                     [&](const Instance& other) { return other.name == instance; });
     const auto index = static_cast<std::size_t>(known - instances.begin());
-    if (known == instances.end()) instances.push_back({instance, std::nullopt});
+    if (known == instances.end()) instances.push_back({instance, {}, {}});
     return {named ? name.substr(slash + 1) : name, index};
 }
 
 Key SetReader::State::key_of(const Frame& frame) const {
     if (joins()) return {0, static_cast<std::uint64_t>(frame.data.host_time.ns)};
-    return {frame.data.epoch, frame.data.tick()};
+    return grid_point(frame);
 }
 
 /// The last key that is of the same set as this one, or of the same grid point.
@@ -153,14 +159,23 @@ std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::size_t
 
 void SetReader::State::begin(std::size_t instance, std::uint64_t life_now) {
     instances[instance].life = life_now;
-    pending.clear();
-    finished.reset();
-    finished_at.reset();
-    last.reset();
+    instances[instance].finished.reset();
+    if (!joins()) finished.reset();  // else by host time, which goes on
+    if (instance == imu_instance) {
+        finished_at.reset();
+        last.reset();
+    }
     for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
         if (places[camera].instance != instance) continue;
         newest[camera].reset();
         ended[camera] = !cameras[camera];
+        for (auto& [key, set] : pending) set.frames[camera].reset();
+    }
+    for (auto set = pending.begin(); set != pending.end();) {
+        const auto& frames = set->second.frames;
+        const bool empty = std::none_of(frames.begin(), frames.end(),
+                                        [](const auto& frame) { return frame.has_value(); });
+        set = empty ? pending.erase(set) : std::next(set);
     }
 }
 
@@ -246,25 +261,53 @@ std::optional<NoItem> SetReader::State::collect() {
 void SetReader::State::add(std::size_t camera, Frame frame) {
     const bool suspect = (frame.data.flags & flag_suspect) != 0 && !options.suspect;
     // Of another life: a camera that lags behind a restart, or is ahead of the others.
-    if (frame.data.trigger == 0 || suspect ||
-        frame.time.life != instances[places[camera].instance].life) {
+    if (frame.data.trigger == 0 || suspect || !has_a_place(frame, camera) ||
+        is_late(frame, camera)) {
         ++report.left_out;
         return;
     }
     const Key key = key_of(frame);
-    if (is_late(key, frame.time)) {
-        ++report.left_out;
-        return;
-    }
     newest[camera] = std::max(newest[camera].value_or(key), key);
-    set_of(key, camera).frames[camera] = std::move(frame);
+    set_of(frame, camera).frames[camera] = std::move(frame);
 }
 
-/// The set that the camera's frame with this key belongs to.
-Pending& SetReader::State::set_of(const Key& key, std::size_t camera) {
-    for (auto& [other, set] : pending)
-        if (after(other) >= key && after(key) >= other && !set.frames[camera]) return set;
-    Pending& set = pending[key];
+/// It is of this life, and where host time counts, of a time that can be.
+bool SetReader::State::has_a_place(const Frame& frame, std::size_t camera) const {
+    const HostTime at = frame.data.host_time;
+    return frame.time.life == instances[places[camera].instance].life &&
+           (!joins() || (at.ns > 0 && at <= host_now() + together));
+}
+
+/// How far the frame is from those of the set, 0 if it is of their grid point. None: it does not
+/// belong there.
+std::optional<Duration> SetReader::State::distance(const Pending& set, const Frame& frame,
+                                                   std::size_t camera) const {
+    if (set.frames[camera]) return std::nullopt;
+    Duration furthest;
+    for (std::size_t other = 0; other < cameras.size(); ++other) {
+        const auto& member = set.frames[other];
+        if (!member) continue;
+        if (places[other].instance != places[camera].instance) {
+            furthest = std::max(furthest, absolute(member->data.host_time - frame.data.host_time));
+            continue;
+        }
+        if (grid_point(*member) != grid_point(frame)) return std::nullopt;
+        return Duration{};
+    }
+    return furthest <= together ? std::optional(furthest) : std::nullopt;
+}
+
+Pending& SetReader::State::set_of(const Frame& frame, std::size_t camera) {
+    Pending* nearest = nullptr;
+    Duration least;
+    for (auto& [key, set] : pending) {
+        const auto far = distance(set, frame, camera);
+        if (!far || (nearest != nullptr && *far >= least)) continue;
+        nearest = &set;
+        least = *far;
+    }
+    if (nearest != nullptr) return *nearest;
+    Pending& set = pending[key_of(frame)];
     if (set.frames.empty()) {
         set.frames.resize(cameras.size());
         set.give_up = deadline_after(options.patience);
@@ -274,9 +317,11 @@ Pending& SetReader::State::set_of(const Key& key, std::size_t camera) {
 
 /// Its set was given up. A camera of another rate counts its ticks apart from the others: a frame
 /// that is newer than the set before is not late, whatever its tick.
-bool SetReader::State::is_late(const Key& key, const EpochTime& time) const {
+bool SetReader::State::is_late(const Frame& frame, std::size_t camera) const {
+    if (instances[places[camera].instance].finished == grid_point(frame)) return true;
+    const Key key = key_of(frame);
     if (!finished || key > after(*finished)) return false;
-    return joins() || key == *finished || !finished_at->precedes(time);
+    return joins() || !finished_at->precedes(frame.time);
 }
 
 /// No frame is added to this set any more. Returns its latest stamp by the IMU's instance.
@@ -284,7 +329,9 @@ std::optional<EpochTime> SetReader::State::end(const Key& key, const Pending& se
     std::optional<EpochTime> latest;
     for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
         const auto& frame = set.frames[camera];
-        if (!frame || places[camera].instance != imu_instance) continue;
+        if (!frame) continue;
+        instances[places[camera].instance].finished = grid_point(*frame);
+        if (places[camera].instance != imu_instance) continue;
         if (!latest || latest->precedes(frame->time)) latest = frame->time;
     }
     finished = key;
@@ -313,7 +360,9 @@ Duration SetReader::State::spread(const Pending& set) const {
 bool SetReader::State::decided(const Key& key, const Pending& set) const {
     if (pending.size() > most_pending || is_over(set.give_up)) return true;
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
-        if (!ended[camera] && (!newest[camera] || after(*newest[camera]) < key)) return false;
+        if (!ended[camera] && !set.frames[camera] &&
+            (!newest[camera] || after(*newest[camera]) < key))
+            return false;
     return true;
 }
 
@@ -412,6 +461,12 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
                            "name each once");
         places.push_back(place);
     }
+    const std::size_t known = state->instances.size();
+    const Place imu_place = options.imu.empty() ? Place{} : state->place(options.imu);
+    if (state->instances.size() != known)
+        return failure(ErrorCode::invalid, options.imu, "is of an instance without a camera here",
+                       "name an IMU of an instance that has one of the cameras");
+    state->imu_instance = imu_place.instance;
     state->cameras.resize(cameras.size());
     state->newest.resize(cameras.size());
     state->ended.resize(cameras.size(), true);
@@ -428,16 +483,9 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
     }
     state->options.wait = left_until(deadline);
     if (!options.imu.empty()) {
-        const std::size_t known = state->instances.size();
-        const Place place = state->place(options.imu);
-        if (state->instances.size() != known)
-            return failure(ErrorCode::invalid, options.imu,
-                           "is of an instance without a camera here",
-                           "name an IMU of an instance that has one of the cameras");
-        auto imu = ImuWindow::open(place.name, state->options_of(place));
+        auto imu = ImuWindow::open(imu_place.name, state->options_of(imu_place));
         if (!imu) return Unexpected(imu.error());
         state->imu.emplace(std::move(*imu));
-        state->imu_instance = place.instance;
     }
     state->options.wait = {};  // from here on, next() waits
     if (state->imu)

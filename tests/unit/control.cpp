@@ -242,18 +242,28 @@ TEST_CASE("control: what LiDARs do is reported whole, or not at all") {
     json bad = good;
     bad["verdict"] = "perhaps";
     CHECK(reported({bad}) == invalid);
+    for (const char* source : {"", "cam0", "10.0.0.3\n", "10.0.0.3\x1b[2J", "10.0.0.3\xc2\x9b"}) {
+        bad = good;
+        bad["source"] = source;
+        CHECK(reported({bad}) == invalid);
+    }
     bad = good;
-    bad["source"] = "";
+    bad["hint"] = std::string(513, 'x');
     CHECK(reported({bad}) == invalid);
+    for (const json& figure : {json("3"), json(0.5), json(INT64_MIN), json(UINT64_MAX)}) {
+        bad = good;
+        bad["ahead_ns"] = figure;
+        CHECK(reported({bad}) == invalid);
+    }
     CHECK(reported({"all"}) == invalid);
     client.call(own + "ReportLidars", {{"lidars", "all"}});
     CHECK(bench.answer(client)["error"] == invalid);
     std::vector<json> many;
     for (int i = 0; i < 32; ++i) {
         many.push_back(good);
-        many.back()["source"] = std::to_string(i);
+        many.back()["source"] = "10.0.1." + std::to_string(i);
     }
-    CHECK(reported(many) == invalid);  // with the first one, 33
+    CHECK(reported(many) == own + "Refused");  // with the first one, 33
     CHECK(bench.service.lidars.report({}).size() == 1);
     many.pop_back();
     CHECK(reported(many).empty());

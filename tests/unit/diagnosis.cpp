@@ -652,7 +652,8 @@ TEST_CASE("diagnosis: of a LiDAR: it follows, does not, or nobody knows") {
     CHECK(diagnosed("off", reported).hint == "why");
     bench.status.time_outputs[0].diagnosis.fault = Fault::time_unknown;
     check_fault(diagnosed("off", reported), Fault::lidar_not_following,
-                "why; the time output 'roof' is waiting");
+                "why; if its time is that of 'roof', see its hint first: it is waiting");
+    CHECK(diagnosed("unproved", reported).hint == "why");
 }
 
 namespace {

@@ -15,12 +15,31 @@ namespace versavis::client {
 
 namespace {
 
+/// What the service keeps.
+constexpr std::size_t most_lidars = 32;
+
+/// The shortest record of one that is judged; what came later belongs to the next report.
+constexpr Duration shortest_record = seconds(1);
+
+/// Those with the most packets: not what a stranger in the network makes up.
+std::vector<LidarReport> worth_reporting(std::vector<LidarReport> reports) {
+    std::erase_if(reports,
+                  [](const LidarReport& report) { return report.duration < shortest_record; });
+    std::sort(reports.begin(), reports.end(),
+              [](const LidarReport& a, const LidarReport& b) { return a.packets > b.packets; });
+    if (reports.size() > most_lidars) reports.resize(most_lidars);
+    return reports;
+}
+
 /// Empty, or why the service does not know them.
-std::string reported(const std::vector<LidarReport>& reports, const std::string& instance) {
+std::string reported(const std::vector<LidarReport>& reports, const std::string& interface,
+                     const std::string& instance) {
     if (reports.empty()) return "";
     auto service = ControlClient::connect(instance);
     if (!service) return service.error().message();
-    const auto done = service->call("ReportLidars", {{"lidars", lidar_json(reports)}});
+    nlohmann::json lidars = lidar_json(reports);
+    for (auto& lidar : lidars) lidar["source"] = lidar.value("source", "") + "%" + interface;
+    const auto done = service->call("ReportLidars", {{"lidars", lidars}});
     return done ? "" : done.error().message();
 }
 
@@ -57,9 +76,10 @@ void LidarCommand::add_watch() {
         "Watch the packets of LiDARs at a network interface, and report to the service whether "
         "they follow: 'versavis status' shows it. Prints what changes (docs/user/lidar.md)");
     watch_->add_option("-i,--interface", interface_, "The network interface")->required();
+    constexpr int shortest_window_s = 6;  // a drift shows after 5 s
     constexpr int longest_window_s = 20;  // the service keeps a report for 30 s
     watch_->add_option("--seconds", seconds_, "From one report to the next")
-        ->check(CLI::Range(2, longest_window_s))
+        ->check(CLI::Range(shortest_window_s, longest_window_s))
         ->capture_default_str();
     watch_->add_flag("--json", json_, "Print one JSON array per report");
 }
@@ -129,16 +149,19 @@ int LidarCommand::run_watch(const std::string& instance) const {
         const auto check = look(*capture, true);
         if (!check) return EX_IOERR;
         if (stop_()) return EX_OK;
-        const auto reports = check->reports();
+        const auto reports = worth_reporting(check->reports());
         std::vector<LidarReport> changed;
+        std::map<std::string, LidarVerdict> now;
         for (const LidarReport& report : reports) {
-            const auto [before, is_new] = known.try_emplace(report.source, report.verdict);
-            if (is_new || before->second != report.verdict) changed.push_back(report);
-            before->second = report.verdict;
+            now[report.source] = report.verdict;
+            const auto before = known.find(report.source);
+            if (before == known.end() || before->second != report.verdict)
+                changed.push_back(report);
         }
+        known = std::move(now);
         fmt::print("{}", json_ ? lidar_json(reports).dump() + "\n" : lidar_text(changed));
         std::fflush(stdout);
-        const std::string problem = reported(reports, instance);
+        const std::string problem = reported(reports, interface_, instance);
         if (!problem.empty() && problem != unheard) fmt::print(stderr, "versavis: {}\n", problem);
         unheard = problem;
     }

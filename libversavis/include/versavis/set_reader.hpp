@@ -51,7 +51,7 @@ struct SetReport {
 /// Not thread-safe. Cameras must be triggered by the board; a set is of one grid point, so cameras
 /// of different rates meet where their grids do. Cameras of several instances are named with it, as
 /// "rear/cam0"; their boards share pulses or a clock. Ticks and output times of two instances do
-/// not compare: frames within 0.5 ms of each other in host time are of one set.
+/// not compare: there, frames within 0.5 ms of each other in host time are of one set.
 class VERSAVIS_API SetReader {
  public:
     /// Errors: as for FrameStream::open and ImuStream::open; invalid: no camera named, or one

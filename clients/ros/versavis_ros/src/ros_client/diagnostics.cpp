@@ -57,8 +57,9 @@ std::vector<DiagnosticStatus> diagnostics(const std::string& instance, const jso
             text(camera, "trigger") == "board" ? "middle of the exposure" : "arrival of the frame");
     for (const json& imu : status.value("imus", json::array()))
         add(text(imu, "name"), imu, "instant of the motion");
-    for (const json& output : status.value("time_outputs", json::array()))
-        add(text(output, "name"), output, "");
+    for (const char* kind : {"time_outputs", "lidars"})
+        for (const json& device : status.value(kind, json::array()))
+            add(text(device, "name"), device, "");
     return statuses;
 }
 
