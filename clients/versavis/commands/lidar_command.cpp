@@ -18,10 +18,8 @@ namespace {
 /// What the service keeps.
 constexpr std::size_t most_lidars = 32;
 
-/// The shortest record of one that is judged; what came later belongs to the next report.
-constexpr Duration shortest_record = seconds(1);
-
-/// Those with the most packets: not what a stranger in the network makes up.
+/// Those with the most packets: not what a stranger in the network makes up. One that has just
+/// begun belongs to the next report.
 std::vector<LidarReport> worth_reporting(std::vector<LidarReport> reports) {
     std::erase_if(reports,
                   [](const LidarReport& report) { return report.duration < shortest_record; });
@@ -38,7 +36,13 @@ std::string reported(const std::vector<LidarReport>& reports, const std::string&
     auto service = ControlClient::connect(instance);
     if (!service) return service.error().message();
     nlohmann::json lidars = lidar_json(reports);
-    for (auto& lidar : lidars) lidar["source"] = lidar.value("source", "") + "%" + interface;
+    for (std::size_t i = 0; i < reports.size(); ++i) {
+        lidars[i]["source"] = reports[i].source + "%" + interface;
+        const LidarVerdict verdict = reports[i].verdict;
+        // Of a clock that is another one, the bounds say nothing.
+        if (verdict != LidarVerdict::follows && verdict != LidarVerdict::drifts)
+            lidars[i]["behind_ns"] = lidars[i]["ahead_ns"] = nullptr;
+    }
     const auto done = service->call("ReportLidars", {{"lidars", lidars}});
     return done ? "" : done.error().message();
 }

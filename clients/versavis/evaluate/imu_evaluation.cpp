@@ -114,7 +114,7 @@ void add_notes(const RecordedImu& imu, ImuEvaluation& evaluation) {
             evaluation.followed, evaluation.frames));
 }
 
-/// What the user may do about a lens that does not fit; smaller is what near scenes make.
+/// A scale nearer to 1 is usual where the scene is not far.
 constexpr double noted_scale = 0.01;
 
 void add_scale_note(ImuEvaluation& evaluation) {
@@ -122,7 +122,7 @@ void add_scale_note(ImuEvaluation& evaluation) {
     if (std::abs(excess) < noted_scale) return;
     evaluation.notes.push_back(fmt::format(
         "the pictures turn by {:.1f} % {} than the gyro: the focal length of the calibration is "
-        "too {}, or the scene is near; the results are without that",
+        "too {}, or the scene is near; the result is corrected for it",
         std::abs(excess) * 100, excess > 0 ? "more" : "less", excess > 0 ? "short" : "long"));
 }
 

@@ -17,6 +17,9 @@ constexpr std::int64_t bucket_ns = second_ns / 10;
 /// Before, no clock of a LiDAR that was set can be; some begin at 1970, others at 2000.
 constexpr Duration year_2020 = seconds(1'577'836'800);
 
+/// No clock is after it: of damaged or false packets alone.
+constexpr Duration year_2200 = seconds(7'258'118'400);
+
 /// A way takes no longer, even where packets wait; more is another time. If lower, busy hosts seem
 /// to have a LiDAR that is off; if higher, small offsets are not seen.
 constexpr Duration longest_delay = milliseconds(50);
@@ -26,7 +29,6 @@ constexpr Duration early = milliseconds(1);
 
 /// A pace can be told after so long.
 constexpr Duration shortest_drift = seconds(5);
-constexpr Duration shortest_record = seconds(1);
 
 /// Less than crystals differ; a LiDAR that follows has none but that of its own control.
 constexpr double largest_drift_ppm = 3;
@@ -127,8 +129,7 @@ void LidarCheck::add(const Datagram& datagram) {
         lidar.remark = packet->remark;
         if (packet->lock == LidarLock::none) ++lidar.unlocked;
     }
-    if (!packet->time) return;
-    ++lidar.timed;
+    if (!packet->time || *packet->time < Duration{} || *packet->time > year_2200) return;
     lidar.covers = packet->covers;
     if (packet->span.ns == 0 && *packet->time < year_2020) {
         lidar.since_start = true;
@@ -172,7 +173,7 @@ LidarReport LidarCheck::judge(const std::string& source, const Lidar& lidar) {
                         "'timestamp_mode'), and check pulse and sentence");
     if (!report.delay)
         return conclude(LidarVerdict::unproved,
-                        "none of its packets has a time: capture its data "
+                        "none of its packets has a time between 1970 and 2200: capture its data "
                         "packets, too");
     if (report.duration < shortest_record)
         return conclude(LidarVerdict::unproved,

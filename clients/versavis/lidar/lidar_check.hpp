@@ -43,6 +43,9 @@ struct LidarReport {
 /// work on their data seem late; if higher, less is known of their clocks.
 inline constexpr Duration longest_way = milliseconds(5);
 
+/// One that was seen for less is not judged.
+inline constexpr Duration shortest_record = seconds(1);
+
 /// Takes the packets of all LiDARs in the order of their arrival. The delay of a packet is the way
 /// and what it waited, which is never negative: the smallest ones show the clock (minimum filter,
 /// as in NTP's clock filter).
@@ -57,7 +60,6 @@ class LidarCheck {
     struct Lidar {
         std::string maker;
         std::uint64_t packets = 0;
-        std::uint64_t timed = 0;
         OutputTime first;
         OutputTime last;
         LidarLock lock = LidarLock::unknown;  ///< of the newest packet that says it

@@ -158,7 +158,7 @@ std::string time_output_lines(const json& output, Hints& hints) {
 std::string lidar_lines(const json& lidar, Hints& hints) {
     std::string line = fmt::format("{:<8} {:<10} {}", text(lidar, "maker"), text(lidar, "state"),
                                    text(lidar, "name"));
-    if (lidar.value("behind_ns", json()).is_number() && text(lidar, "state") != "off")
+    if (lidar.value("behind_ns", json()).is_number())
         line += fmt::format(", {} us behind at most, or {} ahead", in_us(lidar, "behind_ns"),
                             in_us(lidar, "ahead_ns"));
     return wrapped_part(line) + hints.of(lidar, text(lidar, "name"));
