@@ -154,8 +154,8 @@ TEST_CASE("rotation_offset: turns about one axis show the offset, but not the ro
 TEST_CASE(
     "rotation_offset: a wrong focal length is found, and misleads neither offset nor rotation",
     "[statistics]") {
-    const double scale = GENERATE(0.75, 0.9, 0.98, 1.02, 1.1, 1.25);
-    const double about_z = GENERATE(0.3, 1.0, 2.0);
+    const double scale = GENERATE(0.75, 0.98, 1.1);
+    const double about_z = GENERATE(0.3, 2.0);
     CAPTURE(scale, about_z);
     double offset_nees = 0;
     double rotation_nees = 0;
