@@ -255,7 +255,7 @@ TEST_CASE("translator: a stored asymmetry is used until PPS measures another") {
 namespace {
 
 /// A board whose clock is 5 s behind the host's, with exchanges ten times a second and two streams
-/// of 200 Hz, over a link whose delays spread by half a millisecond.
+/// of 200 Hz that steer the clock where they may.
 struct Board {
     Translator translator{*OutputClock::create(OutputClockKind::monotonic_raw)};
     std::size_t streams[2]{translator.add_stream(Witness::grid),
@@ -263,19 +263,27 @@ struct Board {
     std::mt19937_64 random{1};
     HostTime now{1'000'000'000'000};
     Duration offset = -seconds(5);
-    Duration lie;      ///< by which exchanges are later than the truth
-    bool fits = true;  ///< messages follow those of their stream before them
+    double spread_us = 500;  ///< of delays
+    Duration lie;            ///< by which exchanges are later than the truth
+    bool fits = true;        ///< messages follow those of their stream before them
 
     BoardTime board(HostTime at) const { return {(at + offset).ns}; }
     Duration delay() {
-        std::exponential_distribution<> spread(1 / 500e3);
+        std::exponential_distribution<> spread(1e-3 / spread_us);
         return microseconds(80) + Duration{std::llround(spread(random))};
+    }
+    void hear(std::size_t stream) {
+        const OneWay message{board(now), now + delay()};
+        translator.heard(stream, message, fits);
+        if (!fits) return;
+        if (const auto estimate = translator.to_host(message.sent))
+            if (message.arrived - estimate->time < microseconds(200)) translator.clock_continues();
+        if (translator.steers(stream)) translator.add(message);
     }
     void exchange() {
         for (int i = 0; i < 20; ++i) {
             now = now + milliseconds(5);
-            for (const std::size_t stream : streams)
-                translator.heard(stream, {board(now), now + delay()}, fits);
+            for (const std::size_t stream : streams) hear(stream);
         }
         const HostTime received = now + delay();
         translator.add({now, board(received) + lie, board(received) + lie, received + delay()});
@@ -303,6 +311,33 @@ TEST_CASE("translator: exchanges that the streams deny begin no estimate") {
     it.lie = {};
     it.exchange(100);
     CHECK(it.translator.translate(it.board(it.now))->state == ClockState::locked);
+    CHECK(it.translator.report().epoch == epoch);
+}
+
+TEST_CASE("translator: exchanges that lie for long make no stamp wrong, and no epoch") {
+    Board it;
+    it.spread_us = 30;
+    it.random.seed(GENERATE(1U, 2U, 3U));
+    it.exchange(GENERATE(200, 600));
+    struct Lie {
+        std::int64_t us;
+        std::int64_t us_per_s;
+        int exchanges;
+    };
+    const Lie lie =
+        GENERATE(Lie{200, 0, 50}, Lie{-200, 0, 600}, Lie{1000, 0, 600}, Lie{-5000, 0, 2},
+                 Lie{0, 300, 100}, Lie{0, -100, 100}, Lie{0, 30, 120}, Lie{0, -10, 250});
+    CAPTURE(lie.us, lie.us_per_s);
+    const std::uint32_t epoch = it.translator.report().epoch;
+    for (int i = 0; i < lie.exchanges + 100; ++i) {
+        it.lie = i < lie.exchanges ? microseconds(lie.us + lie.us_per_s * i / 10) : Duration{};
+        it.exchange();
+        const auto stamp = it.translator.translate(it.board(it.now));
+        REQUIRE(absolute(stamp->host - it.now).ns <=
+                std::max<std::int64_t>(100'000, 4 * std::int64_t{stamp->sigma_ns}));
+    }
+    CHECK(it.translator.translate(it.board(it.now))->state == ClockState::locked);
+    CHECK(it.translator.translate(it.board(it.now))->sigma_ns < 100'000);
     CHECK(it.translator.report().epoch == epoch);
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/clock/gaussian_state_matrix.hpp"
 #include "engine/clock/square.hpp"
@@ -105,6 +106,13 @@ constexpr double locked_sigma_ns = 250e3;
 // silence is reported later; sigma grows either way.
 constexpr std::int64_t holdover_after_ns = 3'000'000'000;
 
+// When exchanges are in doubt, the estimate is that of so long before, up to twice. Half: what
+// drifts by 10 us/s has moved it before that is noticed. Twice: sigma grows for longer.
+constexpr std::int64_t past_ns = 16'000'000'000;
+
+// After a beginning it is shorter, so that the estimate is as good as it can be then.
+constexpr std::int64_t pasts_per_age = 4;
+
 /// 73 years: what is summed cannot overflow.
 const std::int64_t furthest_ns = std::int64_t{1} << 61;
 
@@ -179,6 +187,7 @@ void EnvelopeFilter::add(const Exchange& exchange, bool denied) {
     continued_ = false;
     contradiction_ = {};
     remember_round_trip(now, round_trip);
+    if (doubt_ > Duration{}) return;
     down_.offer(down, delay_ns(down, down_));
     up_.offer(up, delay_ns(up, up_));
     down_in_slot_ = true;
@@ -191,9 +200,44 @@ void EnvelopeFilter::add(const OneWay& message) {
     const OffsetSample up = to_host(message.sent, message.arrived);
     if (goes_back(message.sent) || contradicts(up, up_)) return;
     ++one_way_messages_;
+    if (doubt_ > Duration{}) return;  // how long messages take says little without exchanges
     up_.offer(up, delay_ns(up, up_));
     last_contact_ = std::max(last_contact_, message.sent);
     close_slot_if_due(message.sent);
+}
+
+void EnvelopeFilter::doubt(Duration by, Duration allowance) {
+    if (begun_ && doubt_ == Duration{} && by > Duration{}) take_back(by);
+    doubt_ = by;
+    allowance_ = allowance;
+}
+
+/// The exchanges may have been wrong for a while before they were in doubt, but were never off by
+/// more than a round trip: then they contradict the estimate, and are not used. What they made of
+/// it since nothing was in doubt is not believed.
+void EnvelopeFilter::take_back(Duration doubt) {
+    const std::optional<Past>& past = older_ ? older_ : newer_;
+    const Duration span = reference_ - (past ? past->at : started_);
+    const double span_s = std::max(static_cast<double>(span.ns) * 1e-9, surprise_span_s);
+    const double moved_ns = static_cast<double>(std::min(doubt, last_round_trip_).ns);
+    if (past) {
+        state_ = past->state.after(span);
+        up_ = past->up;
+        down_ = past->down;
+    } else {
+        matrix(state_)(0, 0) += square(moved_ns);
+    }
+    matrix(state_)(1, 1) += square(moved_ns / span_s);
+    up_.take();
+    down_.take();
+    down_in_slot_ = false;
+}
+
+void EnvelopeFilter::keep_past() {
+    if (doubt_ > Duration{} || allowance_ > Duration{}) return;
+    const std::int64_t apart_ns = std::min((reference_ - started_).ns / pasts_per_age, past_ns);
+    if (newer_ && (reference_ - newer_->at).ns < apart_ns) return;
+    older_ = std::exchange(newer_, Past{state_, up_, down_, reference_});
 }
 
 void EnvelopeFilter::board_restarted() {
@@ -218,6 +262,8 @@ void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     begun_ = true;
     confirmed_ = false;
     reset_ = false;
+    older_.reset();
+    newer_.reset();
     contradictions_ = unwitnessed_contradictions_ = 0;
     persistence_.forget();
     continued_ = false;
@@ -288,6 +334,7 @@ void EnvelopeFilter::close_slot(BoardTime now) {
     if (down && !down_first) use(*down, down_);
     follow_rise();
     last_innovation_ = rounded(state_.offset_after(newest - reference_) - expected);
+    keep_past();
 }
 
 /// Both directions take longer than they did, by more than they spread, or both are shorter than

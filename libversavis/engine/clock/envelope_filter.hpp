@@ -43,10 +43,8 @@ class EnvelopeFilter {
     void add(const OneWay& message);
 
     /// Other messages contradict the exchanges by so much, from now on, or allow them to be off.
-    void doubt(Duration by, Duration allowance) {
-        doubt_ = by;
-        allowance_ = allowance;
-    }
+    /// While they are contradicted the estimate goes on without them.
+    void doubt(Duration by, Duration allowance);
 
     /// The board restarted: its clock starts over, with the same crystal and link.
     void board_restarted();
@@ -95,6 +93,14 @@ class EnvelopeFilter {
     void record(std::vector<EdgeSite>& sites) { sites_ = &sites; }
 
  private:
+    /// The estimate while nothing was in doubt.
+    struct Past {
+        GaussianState state;
+        DelayEdge up;
+        DelayEdge down;
+        BoardTime at;
+    };
+
     void begin(const Exchange& exchange, Duration round_trip);
     void restart(const Exchange& exchange, Duration round_trip);
     bool contradicts(const OffsetSample& sample, const DelayEdge& edge);
@@ -106,6 +112,8 @@ class EnvelopeFilter {
     void follow_rise();
     void follow_fall(const OffsetSample& up, const OffsetSample& down);
     void shift_level(double by_ns);
+    void take_back(Duration doubt);
+    void keep_past();
     void use(const OffsetSample& sample, DelayEdge& edge);
     void move(const OffsetSample& sample, const DelayEdge& edge);
     void remember_round_trip(BoardTime now, Duration round_trip);
@@ -118,6 +126,8 @@ class EnvelopeFilter {
     GaussianState state_;
     DelayEdge up_{Direction::to_host};
     DelayEdge down_{Direction::to_board};
+    std::optional<Past> newer_;
+    std::optional<Past> older_;
     std::optional<Asymmetry> asymmetry_;
 
     BoardTime started_;

@@ -71,10 +71,13 @@ void Translator::clock_continues() {
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
     const std::uint64_t restarts = filter_.restarts();
-    filter_.add(exchange, witnesses_.deny(exchange));
-    if (filter_.restarts() != restarts) witnesses_.clock_stepped();
+    const bool denied = witnesses_.deny(exchange);
     witnesses_.exchanged(exchange, filter_.skew());
-    if (witnesses_.show_clock_step()) {
+    filter_.doubt(witnesses_.doubt(), witnesses_.allowance());
+    filter_.add(exchange, denied);
+    if (filter_.restarts() != restarts) {
+        witnesses_.clock_stepped();
+    } else if (witnesses_.show_clock_step()) {
         filter_.clock_stepped();
         witnesses_.clock_stepped();
     }
